@@ -15,6 +15,7 @@ from typing import Any
 
 CATALOGUES = [str(Path(__file__).resolve().parent.parent / "tests" / folder) for folder in ("catalogue", "integrate")]
 TURNS = 3  # of which the fastest counts
+SETTLING = 0.5  # seconds of calls before the first that counts: machine code takes over meanwhile, in its own time
 CLOCK = time.process_time  # what others do on the machine is no part of it
 LONG = 10.0  # seconds of a first call after which there is no second one
 
@@ -49,7 +50,10 @@ class Line:
 
 
 def warm(run: Callable[[], Any]) -> float:
-    """Seconds of one call after the first. The clock of the processor may tick slowly: many short calls are taken."""
+    """Seconds of one call after the first ones. The processor's clock may tick slowly: many short calls are taken."""
+    settled = time.perf_counter() + SETTLING
+    while time.perf_counter() < settled:
+        run()
     timer = timeit.Timer(run, timer=CLOCK)
     number, spent = timer.autorange()
     return min([spent, *timer.repeat(TURNS - 1, number)] if spent < LONG / TURNS else [spent]) / number

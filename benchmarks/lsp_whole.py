@@ -119,6 +119,7 @@ def drawn(rows: Rows, file: Path) -> None:
     matplotlib.use("agg")
     from matplotlib import pyplot
 
+    sizes = list(next(iter(rows.values())))
     looks = {file: "default"}
     if "-light." in file.name:
         looks[file.with_name(file.name.replace("-light.", "-dark."))] = "dark_background"
@@ -128,6 +129,9 @@ def drawn(rows: Rows, file: Path) -> None:
             for what, costs in rows.items():
                 if "cold" not in what:
                     axes.loglog(list(map(int, costs)), list(costs.values()), marker="o", markersize=3, label=what)
+            axes.set_xticks(sizes, [f"{size:,}" for size in sizes])
+            axes.set_yticks([0.2, 0.5, 1, 2, 5, 10, 20], ["0.2", "0.5", "1", "2", "5", "10", "20"])
+            axes.minorticks_off()
             axes.set_xlabel("lines of the file")
             axes.set_ylabel("ms of processor time")
             axes.grid(alpha=0.3)

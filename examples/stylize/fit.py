@@ -1,4 +1,5 @@
-"""A picture as a mesh of coloured triangles: `python fit.py [constant|linear|quadratic]` fits corners and colours.
+"""A picture as a mesh of coloured triangles: `python fit.py [constant|linear|quadratic]` fits corners and colours,
+`python fit.py --side 22 --pixels 512 --steps 100` those of 968 triangles to a large picture.
 
 The loss and its gradient, in all corners and colours, are those of `stylize.po`; scipy's L-BFGS-B goes down. Triangles
 are kept from turning over by a barrier: the loss grows without end as one loses its area. Corners are measured in cells
@@ -7,7 +8,7 @@ of the grid, so that a step moves them about as far as it changes colours, and t
 
 from __future__ import annotations
 
-import sys
+import argparse
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -155,12 +156,21 @@ def pictures(folder: Path, quick: bool) -> list[dict[str, Any]]:
 
 
 def main() -> None:
-    kind = sys.argv[1] if len(sys.argv) > 1 else "constant"
-    if kind not in TERMS:
-        sys.exit(f"fit.py: the kinds of colour are {', '.join(TERMS)}, not {kind}")
-    mesh = fitted(kind, target(), 7, 60)
-    Image.fromarray(drawn(mesh, 384)).save(f"{kind}.png")
-    print(f"{kind}.png: {len(mesh.losses) - 1} steps in {mesh.seconds:.1f} s, "
+    parser = argparse.ArgumentParser(description="Fit a mesh of coloured triangles to a picture.")
+    parser.add_argument("kind", nargs="?", choices=tuple(TERMS), default="constant", help="of colour in a triangle")
+    parser.add_argument("--side", type=int, default=7, help="cells of the grid across, of two triangles each")
+    parser.add_argument("--steps", type=int, default=60, help="down, at the most")
+    parser.add_argument("--pixels", type=int, metavar="N", help="the target made anew with N x N pixels")
+    options = parser.parse_args()
+    if options.pixels is None:
+        photo = target()
+    else:
+        from target import evening  # beside this file, which is a script here
+
+        photo = evening(options.pixels)
+    mesh = fitted(options.kind, photo, options.side, options.steps)
+    Image.fromarray(drawn(mesh, max(384, len(photo)))).save(f"{options.kind}.png")
+    print(f"{options.kind}.png: {len(mesh.losses) - 1} steps in {mesh.seconds:.1f} s, "
           f"loss {mesh.losses[0]:.5f} to {mesh.losses[-1]:.5f}")  # fmt: skip
 
 

@@ -1,6 +1,6 @@
-"""The programs of a session: the database, the files in it, and what is to be said about each.
+"""The programs of a session: the database, its files, and what there is to say about each.
 
-Owns `Analysis`. Everything here is for the one thread that works with the database; `work` sees to that.
+Owns `Analysis`. All of it belongs to the one thread that works with the database, see `work`.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ if TYPE_CHECKING:
 logger = logging.getLogger(__name__)
 
 
-# What is forgotten of closed files, by what the queries are asked about: a chunk's text, a file, some definitions.
+# Queries that are forgotten for closed files, by what they take: the text of a chunk, a file, or some definitions.
 OF_TEXTS = frozenset({"parsed", "head", "chunk_references", "occurring_names"})
 OF_FILES = frozenset({"definition", "core", "core_term"})
 OF_GROUPS = frozenset({"_analyses"})
-MOST_USERS = 50  # files that are looked at because a file that they import was opened
+MOST_USERS = 50  # files to prepare because they import a file that was opened
 
 
 class Analysis:
@@ -50,8 +50,8 @@ class Analysis:
         self._texts: dict[str, Text] = {}
         self._failing: dict[tuple[str, str], str] = {}
         self._verdicts = Verdicts(self.db)
-        self._checked: set[str] = set()  # files asked for: only the first answer may be from an earlier session
-        self._ripe: set[str] = set()  # files that were checked since trees were forgotten
+        self._checked: set[str] = set()  # files asked for; only the first answer may come from an earlier session
+        self._ripe: set[str] = set()  # files checked since trees were last forgotten
         self.settled = False  # whether all files have been checked
         self._crew: Crew | None = None
         self.taken: set[str] = set()  # files that helpers have checked
@@ -87,7 +87,7 @@ class Analysis:
         self.files.set_roots([*roots, *self.folders])
 
     def put(self, document: Document) -> str:
-        """A document was opened or changed; its key."""
+        """Note that a document was opened or changed. Returns its key."""
         key = to_key(document.uri)
         self._documents.pop(key, None)
         self._documents[key] = document
@@ -97,7 +97,7 @@ class Analysis:
         return key
 
     def finds_project(self, key: str) -> bool:
-        """Whether a file belongs to a project that was not known yet."""
+        """Whether a file belongs to a project that was not known before."""
         project = self._found.of(key)
         known = project is None or any(project.folder == other.folder for other in self.projects)
         if not known:
@@ -105,7 +105,7 @@ class Analysis:
         return not known
 
     def close(self, document: Document) -> str:
-        """A document was closed: the disk counts again."""
+        """Note that a document was closed: from now on the file on disk counts."""
         key = to_key(document.uri)
         self._documents.pop(key, None)
         self._texts.pop(key, None)
@@ -119,11 +119,11 @@ class Analysis:
 
     @property
     def documents(self) -> Mapping[str, Document]:
-        """What is open, by key, the longest untouched first."""
+        """The open documents by key, the least recently edited first."""
         return self._documents
 
     def uri(self, key: str) -> str:
-        """The URI of a file, as the client writes it if the file is open."""
+        """The URI of a file; for an open one, as the client writes it."""
         document = self._documents.get(key)
         return document.uri if document is not None else to_uri(key)
 
@@ -140,9 +140,8 @@ class Analysis:
         return known
 
     def forget_trees(self) -> None:
-        """Forget the trees, terms and analyses of the closed files that were checked since the last time, which are
-        most of the memory: what was found in them stays, and making them again takes less than a millisecond a
-        definition."""
+        """Forget the trees, terms and analyses of closed files that were checked since the last call. They take most of
+        the memory. What was found in them stays, and making them again takes less than a millisecond a definition."""
         closed = self._ripe - self._documents.keys()
         texts = {chunk.text for key in closed for chunk in chunks(self.db, key)}
         texts.difference_update(chunk.text for key in self._documents for chunk in chunks(self.db, key))
@@ -161,15 +160,15 @@ class Analysis:
             parsed(self.db, chunk.text, is_diffeo(key))
 
     def prepare_users(self, key: str) -> None:
-        """Read and analyse what uses a file's definitions elsewhere, before the first edit of one of their heads asks
-        for all of it at once."""
+        """Read and analyse the definitions in other files that use this file, before the first edit of a signature
+        needs them all at once."""
         users = [file for file in self.programs() if file != key and key in imported_files(self.db, file)]
         for file in users[:MOST_USERS]:
             bound = {name.partition(".")[0] for item in imports(self.db, file) for name, _ in bindings(item)}
             for name in names(self.db, file):
                 text = chunk_text(self.db, file, name) or ""
                 if not any(word in text for word in bound):
-                    continue  # what uses nothing from elsewhere needs no tree to say so
+                    continue  # uses nothing from elsewhere; this needs no tree
                 if any(target.file == key for target in dependencies(self.db, file, name)):
                     self._analyse(file, name)
 
@@ -188,13 +187,13 @@ class Analysis:
         return tuple(dict.fromkeys([*self._documents, *self.files.all_files()]))
 
     def diagnostics(self, key: str) -> tuple[Located, ...]:
-        """What is wrong with a file. A bug of ours in one definition costs what is said of that one alone."""
+        """What is wrong with a file. A bug of ours in one definition loses the diagnostics of that definition only."""
         if not self.settled and key in self._documents and key not in self._checked:
             self._checked.add(key)
             known = self._verdicts.of(key)
             if known is not None:
                 return known
-        from potto.checking import check  # slow to import, and what is known from earlier is told without it
+        from potto.checking import check  # slow to import, and not needed for what is known from earlier
 
         if key not in self.taken:
             self._ripe.add(key)
@@ -210,7 +209,7 @@ class Analysis:
     # Helpers
 
     def call_helpers(self) -> None:
-        """Let processes of their own check closed files beside this one, if there are so many that it is worth it."""
+        """Let helper processes check the closed files too, if there are enough files for that to pay."""
         from potto.crew import Crew, helpers_for
 
         files = [key for key in self.programs() if key not in self._documents]
@@ -231,17 +230,17 @@ class Analysis:
 
     @property
     def helpers_have_found(self) -> bool:
-        """Whether there is something to take over from the helpers."""
+        """Whether the helpers have results to take over."""
         return self._crew is not None and self._crew.has_found
 
     def take_over(self) -> None:
-        """Take over what a helper has found out about one file."""
+        """Take over what a helper found out about one file."""
         file = None if self._crew is None else self._crew.take()
         if file is not None:
             self.taken.add(file)
 
     def dismiss_helpers(self) -> None:
-        """There is nothing left to do for helpers."""
+        """End the helpers: there is nothing left for them to do."""
         if self._crew is not None:
             self._crew.close()
         self._crew = None
@@ -249,7 +248,7 @@ class Analysis:
     # Later sessions
 
     def keep(self, key: str) -> None:
-        """Keep for later sessions what was found out about a file."""
+        """Keep what was found out about a file for later sessions."""
         from potto.checking.check import diagnostics
 
         try:
@@ -258,7 +257,7 @@ class Analysis:
             self.failed(key, "verdict", error)
 
     def _guarded(self, key: str) -> list[Diagnostic]:
-        """The diagnostics of a file part by part; a part that fails is logged once for each of its texts."""
+        """The diagnostics of a file, part by part. A part that fails is logged, once for each error message."""
         from potto.checking.check import absolute, definition_diagnostics
         from potto.types import check_statement
 
@@ -283,14 +282,14 @@ class Analysis:
         return found
 
     def failed(self, key: str, name: str, error: Exception) -> None:
-        """A check failed by a bug of ours: logged once for each of its messages."""
+        """A check failed because of a bug of ours. Each message is logged once."""
         told = f"{type(error).__name__}: {error}"
         if self._failing.get((key, name)) != told:
             self._failing[key, name] = told
             logger.error("the check of %s in %s failed", name, key, exc_info=error)
 
     def levels(self, key: str) -> Mapping[str, str]:
-        """How lints count in a file: the innermost project's word, then the client's settings."""
+        """The levels of lints in a file: the client's settings, then the innermost project."""
         levels = self._levels.get(key)
         if levels is None:
             project, lints = self._found.of(key), self._settings.get("lints")

@@ -27,14 +27,14 @@ if TYPE_CHECKING:
 
 
 def uri_of(params: Any) -> str | None:
-    """The document that parameters are about, if they are about one."""
+    """The URI of the document that parameters are about, if any."""
     item = params.get("textDocument") if isinstance(params, Mapping) else None
     uri = item.get("uri") if isinstance(item, Mapping) else None
     return uri if isinstance(uri, str) else None
 
 
 def about(params: Any) -> str | None:
-    """The document that parameters name anywhere: also those of what is resolved, of items and of commands."""
+    """The URI of any document that parameters name, including items to resolve and arguments of commands."""
     found = uri_of(params)
     if found is not None or not isinstance(params, Mapping):
         return found
@@ -110,13 +110,13 @@ class Ask(Struct, dict=True):
         return self.text.offset(line, character)
 
     def get(self, name: str) -> Any:
-        """A parameter that must be there."""
+        """A required parameter."""
         if not isinstance(self.params, Mapping) or self.params.get(name) is None:
             raise InvalidParams(f"`{name}` is missing")
         return self.params[name]
 
     def optional(self, *path: str) -> Any:
-        """A parameter that may be missing: then None."""
+        """An optional parameter; None if it is missing."""
         found = self.params
         for name in path:
             found = found.get(name) if isinstance(found, Mapping) else None
@@ -137,7 +137,8 @@ class Ask(Struct, dict=True):
         return found
 
     def range(self, span: Span) -> protocol.Range:
-        """A span of the document as a range. Answers about whole files have thousands: they give way between them."""
+        """A span of the document as a range. Answers about whole files convert thousands, so this is a point at which
+        they can be cancelled."""
         self.db.give_way()
         return convert.range_of(self.text, span)
 

@@ -43,7 +43,7 @@ _LATER = object()  # what stands for the result of a handler that has returned a
 
 
 def settle(future: Future[Any], result: Any = None, error: RequestError | None = None) -> None:
-    """Answer a request, unless it was answered or cancelled."""
+    """Answer a request, unless it was answered or cancelled already."""
     with suppress(InvalidStateError):
         if error is None:
             future.set_result(result)
@@ -52,7 +52,7 @@ def settle(future: Future[Any], result: Any = None, error: RequestError | None =
 
 
 class Protocol(JsonRPCProtocol):
-    """JSON-RPC to the letter. `_server` says what a message means at this stage of the session."""
+    """JSON-RPC to the letter. `_server` knows what is allowed at this stage of the session."""
 
     _server: Carrier
 
@@ -158,7 +158,7 @@ class Protocol(JsonRPCProtocol):
     # Sending
 
     def fail(self, id: Id | None, code: int, message: str, data: Any = None) -> None:
-        """Answer with an error; `id` is None for what has none that could be read."""
+        """Answer with an error. `id` is None if the request had none that could be read."""
         self._send_response(cast(Id, id), error=JsonRpcException(message, code, data).to_response_error())
 
     def _send_response(self, msg_id: Id, result: Any = None, error: ResponseError | None = None) -> None:
@@ -193,11 +193,11 @@ class Carrier(JsonRPCServer):
         return 1
 
     def refused(self, method: str) -> RequestError | None:
-        """Why a request is out of time, if it is."""
+        """Why a request is refused at this stage of the session, if it is."""
         raise NotImplementedError
 
     def listens(self, method: str) -> bool:
-        """Whether a notification counts."""
+        """Whether notifications are heeded at this stage."""
         raise NotImplementedError
 
     def status(self) -> int:
@@ -205,5 +205,5 @@ class Carrier(JsonRPCServer):
         raise NotImplementedError
 
     def report_server_error(self, error: Exception, source: Any) -> None:
-        """For the log: a user cannot do anything about it."""
+        """Log an error; the user could do nothing about it."""
         logger.error("%s", error)

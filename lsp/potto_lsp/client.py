@@ -1,6 +1,6 @@
-"""What the client told about itself when it said hello: capabilities, folders, encoding.
+"""What the client says about itself in its greeting: capabilities, folders, encoding.
 
-Owns `Client`, which never fails: whatever is missing or of a wrong shape counts as not supported.
+Owns `Client`, which never fails: whatever is missing or malformed counts as not supported.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class Client:
 
     @property
     def encoding(self) -> Encoding:
-        """The first encoding of positions that the client offers and we know; UTF-16 if it offers none."""
+        """The first of the client's encodings of positions that we know; UTF-16 if it offers none."""
         offered = self.value("general.positionEncodings")
         for encoding in offered if isinstance(offered, list) else ():
             if encoding in ENCODINGS:
@@ -65,7 +65,7 @@ class Client:
 
     @property
     def process(self) -> int | None:
-        """The process to live and die with."""
+        """The client's process; the server ends with it."""
         found = self.params.get("processId")
         return found if isinstance(found, int) and not isinstance(found, bool) and found > 0 else None
 
@@ -77,7 +77,7 @@ class Client:
 
     @property
     def presents(self) -> bool:
-        """Whether the client has commands of its own for Potto: then it shows the answers of ours itself."""
+        """Whether the client has Potto commands of its own, and so shows the answers of ours by itself."""
         found = self.value("experimental.commands.commands")
         return isinstance(found, list) and any(str(name).startswith("potto.") for name in found)
 

@@ -1,6 +1,6 @@
-"""Between offsets and positions, and from values of Potto to values of the protocol.
+"""Conversions between offsets and positions, and from values of Potto to those of the protocol.
 
-Owns every conversion that more than one feature needs. UTF-16 ends here.
+Owns every conversion that more than one feature needs. Nothing behind it knows UTF-16.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ def markdown(text: str) -> protocol.MarkupContent:
 
 
 def markup(client: Client, capability: str, text: str) -> protocol.MarkupContent:
-    """A text in markdown, or without its signs for a client that says in a capability that it shows no markdown."""
+    """A text in markdown, or as plain text for clients that say they show no markdown."""
     formats = client.value(capability)
     if not isinstance(formats, list) or "markdown" in formats or not formats:
         return markdown(text)
@@ -60,7 +60,7 @@ def markup(client: Client, capability: str, text: str) -> protocol.MarkupContent
 
 
 def plain(text: str) -> str:
-    """Markdown of ours without its signs."""
+    """Our markdown without its markup."""
     lines = [line for line in text.splitlines() if not line.startswith("```")]
     unmarked = (re.sub(r"^\*([^*].*)\*$", r"\1", line.replace("**", "").replace("`", "")) for line in lines)
     return "\n".join("" if line == "---" else line for line in unmarked)
@@ -72,7 +72,7 @@ def text_edits(text: Text, edits: Iterable[Edit]) -> list[protocol.TextEdit]:
 
 
 def workspace_edit(analysis: Analysis, client: Client, change: Change) -> protocol.WorkspaceEdit:
-    """A change of the workspace, with versions where the client understands them."""
+    """A change of the workspace, with versions if the client understands them."""
     if not client.can("workspace.workspaceEdit.documentChanges"):
         return {"changes": {analysis.uri(f.file): text_edits(analysis.text(f.file), f.edits) for f in change.files}}
     changes: list[Any] = [_document_edit(analysis, edits) for edits in change.files]
@@ -102,7 +102,7 @@ def _file_rename(analysis: Analysis, rename: FileRename) -> dict[str, Any]:
 def diagnostics(
     analysis: Analysis, client: Client, found: Iterable[Located], file: str, text: Text
 ) -> list[protocol.Diagnostic]:
-    """What is said about a file with this text."""
+    """What there is to say about a file with this text."""
     return [_diagnostic(analysis, client, located.diagnostic, file, text) for located in found]
 
 

@@ -1,4 +1,5 @@
-"""Bugs of ours, survived: logged, told, and a feature that fails again and again on one text switched off for it.
+"""Surviving bugs of ours: they are logged and reported, and a feature that keeps failing on a text is turned off for
+it.
 
 Owns `Crashes`.
 """
@@ -12,13 +13,13 @@ from collections.abc import Callable
 from typing import Any
 
 logger = logging.getLogger(__name__)
-MOST = 3  # failures in a row, after which a feature is off for that version of that file
+MOST = 3  # failures in a row that turn a feature off for that version of the file
 
 Version = tuple[str, str, int | None]  # the method, the file, its version
 
 
 class Crashes:
-    """What failed how often."""
+    """Counts failures."""
 
     def __init__(self, notify: Callable[[str, Any], None]) -> None:
         self._notify = notify
@@ -29,19 +30,19 @@ class Crashes:
         return bool(self._count) and self._count[version] >= MOST
 
     def note(self, version: Version) -> None:
-        """A feature failed; to be called where the exception is handled."""
+        """Count a failure of a feature. Call it where the exception is handled."""
         self._count[version] += 1
         self.tell(f"{version[0]} for {version[1] or 'the workspace'}")
         if self._count[version] == MOST:
             self._log(f"{version[0]} is off for {version[1] or 'the workspace'} until that changes")
 
     def forget(self, version: Version) -> None:
-        """A feature works."""
+        """A feature worked: start counting anew."""
         if self._count:
             self._count.pop(version, None)
 
     def tell(self, what: str) -> None:
-        """Something failed; to be called where the exception is handled."""
+        """Report a failure to the user. Call it where the exception is handled."""
         error = sys.exc_info()[1]
         logger.error("%s failed", what, exc_info=True)
         self._log(f"{what} failed; this is a bug in Potto: {type(error).__name__}: {error}")

@@ -1,4 +1,4 @@
-"""An answer that comes later, from somebody else than the thread that owns the database."""
+"""An answer that comes later, not from the thread that owns the database."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from potto_lsp.errors import RequestError
 
 
 class Deferred(Struct, frozen=True):
-    """What an adapter gives instead of an answer. `start(finish)` begins; whoever has the answer, or the error, calls
-    `finish` with it, from any thread. `stop` is called if nobody waits for it any more."""
+    """What an adapter returns instead of an answer. `start(finish)` begins the work; `finish` is called with the answer
+    or the error, from any thread. `stop` is called if nobody waits for it any more."""
 
     start: Callable[[Callable[[Any | RequestError], None]], None]
     stop: Callable[[], None]

@@ -1,6 +1,6 @@
 """The open documents: their texts as the client has them, version by version.
 
-Owns `Document` (immutable) and `Documents`. Only the thread that reads messages changes them; anyone may hold one.
+Owns `Document` (immutable) and `Documents`. Only the reading thread changes them; any thread may hold one.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class Documents:
         return tuple(self._open.values())
 
     def open(self, params: Mapping[str, Any]) -> Document:
-        """`textDocument/didOpen`. One that is already open starts over."""
+        """`textDocument/didOpen`. A document that is already open is replaced."""
         item = params["textDocument"]
         uri, text = item["uri"], item["text"]
         if not isinstance(uri, str) or not isinstance(text, str):
@@ -52,7 +52,7 @@ class Documents:
         return document
 
     def change(self, params: Mapping[str, Any]) -> Document | None:
-        """`textDocument/didChange`. None if it is out of date, or about a document that is not open."""
+        """`textDocument/didChange`. None if the change is out of date, or if the document is not open."""
         uri, version = params["textDocument"]["uri"], _version(params["textDocument"])
         document = self._open.get(uri)
         if document is None:

@@ -1,4 +1,4 @@
-"""What a request can be answered with instead of a result."""
+"""What a request can be answered with in place of a result."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ REQUEST_CANCELLED = -32800
 
 
 class RequestError(Exception):
-    """A request that is answered with an error of the protocol."""
+    """Answers a request with an error of the protocol."""
 
     def __init__(self, code: int, message: str, data: Any = None) -> None:
         super().__init__(message)
@@ -24,14 +24,14 @@ class RequestError(Exception):
 
 
 class InvalidParams(RequestError):
-    """Parameters that lack what the method needs."""
+    """The parameters are not what the method needs."""
 
     def __init__(self, message: str) -> None:
         super().__init__(INVALID_PARAMS, message)
 
 
 class Refusal(RequestError):
-    """Something that is well asked for and not done, for a reason that the user should read."""
+    """A valid request that is not carried out, for a reason that the user should read."""
 
     def __init__(self, message: str) -> None:
         super().__init__(REQUEST_FAILED, message)

@@ -1,7 +1,7 @@
-"""The server's side of the evaluation process: started when first needed, asked one task at a time.
+"""The server's side of the evaluation process, which is started when first needed and given one task at a time.
 
 Owns `Evaluator` and `Task`. A task has limits of time and memory and can be cancelled: the process is interrupted, and
-ended if it does not heed that. One that dies is started again for the next task.
+killed if it doesn't react. If it dies, the next task starts a new one.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ logger = logging.getLogger(__name__)
 LIMIT, LOADING, GRACE = 10.0, 60.0, 0.5  # seconds: for a task, for the start, to heed an interrupt
 MEMORY = 4096.0  # megabytes for a task
 PATIENCE = 0.3  # seconds that a task may run on while a more urgent one waits
-COMMAND, LIVE, POINTS = 0, 1, 2  # how urgent a task is: what a user asked for comes first
+COMMAND, LIVE, POINTS = 0, 1, 2  # the urgency of tasks: what a user asked for comes first
 
 
 class Task(Struct, eq=False):
-    """Something to evaluate; `done` is called once, on the evaluator's thread, with `result` or `error` in it."""
+    """Something to evaluate. `done` is called once, on the evaluator's thread, with either `result` or `error`."""
 
     do: str
     file: str
@@ -46,15 +46,15 @@ class Task(Struct, eq=False):
 
 
 class Ended(Exception):
-    """The process has ended before it has answered."""
+    """The process ended without an answer."""
 
 
 class GivesWay(Exception):
-    """A task has been stopped in favour of one that is more urgent."""
+    """A task was stopped for a more urgent one."""
 
 
 class Evaluator:
-    """The queue of tasks and the process that does them."""
+    """The queue of tasks, and the process that carries them out."""
 
     def __init__(self, analysis: Analysis) -> None:
         self._analysis = analysis
@@ -66,7 +66,7 @@ class Evaluator:
         self._ids, self._order = itertools.count(1), itertools.count(1)
 
     def put(self, task: Task) -> Task:
-        """Do a task with the texts as they are now. For the thread that owns the database."""
+        """Queue a task, with the texts as they are now. For the thread that owns the database."""
         analysis = self._analysis
         task.texts = {key: document.text.text for key, document in analysis.documents.items()}
         task.roots = analysis.files.roots
@@ -79,7 +79,7 @@ class Evaluator:
         return task
 
     def _setting(self, name: str, default: float) -> float:
-        """A limit that the user has set, if it is a number above 0."""
+        """A limit set by the user, if it is a positive number."""
         value = self._analysis.settings.get(name)
         return float(value) if isinstance(value, int | float) and value > 0 else default
 
@@ -88,7 +88,7 @@ class Evaluator:
 
     @property
     def started(self) -> bool:
-        """Whether there ever was a process."""
+        """Whether a process was ever started."""
         return self._thread is not None
 
     def close(self) -> None:
@@ -113,8 +113,8 @@ class Evaluator:
             task.done(answer)
 
     def _answered(self, task: Task) -> Mapping[str, Any]:
-        """An answer. A process that ended may have been killed by others, so that a new one is asked; if that ends too,
-        it is the question that kills them."""
+        """The answer to a task. If the process ends, something else may have killed it, so a new one is asked; if that
+        ends too, the task is to blame."""
         for _ in range(2):
             try:
                 return self._answer(task)
@@ -162,12 +162,12 @@ class Evaluator:
                 return said
 
     def _is_pressed(self, task: Task) -> bool:
-        """Whether something more urgent waits."""
+        """Whether something more urgent is waiting."""
         with self._tasks.mutex:
             return bool(self._tasks.queue) and self._tasks.queue[0][0] < task.urgency
 
     def _interrupt(self, id: int, why: str) -> Mapping[str, Any]:
-        """Stop what runs; with the process if it does not heed."""
+        """Interrupt the running task; kill the process if it doesn't react."""
         import signal
 
         process = self._process
@@ -185,7 +185,7 @@ class Evaluator:
         return {"error": why}
 
     def _running(self) -> subprocess.Popen[str] | None:
-        """The process, started if need be."""
+        """The process, started if necessary."""
         if self._process is not None and self._process.poll() is None:
             return self._process
         self._sent, self._said = {}, SimpleQueue()

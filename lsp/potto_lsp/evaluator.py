@@ -1,7 +1,7 @@
-"""The evaluation process: runs programs for the server, so that nothing they do holds it up.
+"""The evaluation process: it runs programs for the server, so that nothing they do can hold the server up.
 
-Owns `main`: one JSON object a line on standard input, one a line on standard output. Started by `evaluation`, as
-`python -m potto_lsp.evaluator`. An interrupt ends the task at hand and not the process.
+Owns `main`: one JSON object a line on standard input, and one a line on standard output. `evaluation` starts it as
+`python -m potto_lsp.evaluator`. An interrupt ends the current task, not the process.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class Unanswerable(Exception):
 
 
 class Interrupts:
-    """An interrupt counts only while a task runs."""
+    """Interrupts count only while a task runs."""
 
     def __init__(self) -> None:
         self._running = False
@@ -54,7 +54,8 @@ class Interrupts:
 
 
 def main() -> int:
-    """Do tasks until standard input ends, or memory does: what a task has left behind would fail the next ones."""
+    """Carry out tasks until standard input ends, or until memory runs out: what is left of one task would make the next
+    ones fail."""
     from potto_lsp.main import take_streams
 
     reader, writer = take_streams()
@@ -79,8 +80,8 @@ def main() -> int:
 
 @contextmanager
 def _within(megabytes: float) -> Iterator[None]:
-    """Let the task have so much memory, where the system can hold a process to that (Linux: what it has to itself,
-    so that neither libraries nor mapped files count)."""
+    """Limit the memory of a task, where the system can: on Linux, private memory, so that libraries and mapped files
+    don't count."""
     try:
         import resource
     except ImportError:  # Windows
@@ -106,12 +107,12 @@ def _say(stream: TextIO, message: Mapping[str, Any]) -> None:
     try:
         stream.write(json.dumps(message) + "\n")
         stream.flush()
-    except BrokenPipeError:  # the server is gone, and with it whoever would read what we have to say about that
+    except BrokenPipeError:  # the server is gone, so nobody would read a message about it
         os._exit(0)
 
 
 def _end_with(parent: int) -> None:
-    """End when the server is gone, also in the middle of a task."""
+    """End when the server ends, even in the middle of a task."""
 
     def watch() -> None:
         while os.getppid() == parent:
@@ -122,7 +123,7 @@ def _end_with(parent: int) -> None:
 
 
 def _answer(world: World, task: Mapping[str, Any]) -> dict[str, Any]:
-    """What becomes of a task: `result`, or `error` as a text for the user."""
+    """The outcome of a task: `result`, or `error` as a text for the user."""
     world.files.set_roots(task["roots"])
     for key, text in task["texts"].items():
         if text is None:
@@ -138,7 +139,7 @@ def _answer(world: World, task: Mapping[str, Any]) -> dict[str, Any]:
         return {"error": str(error)}
     except MemoryError:
         raise
-    except Exception as error:  # a bug of ours: told, and the process lives on
+    except Exception as error:  # a bug of ours: report it and go on
         import traceback
 
         traceback.print_exc()
@@ -156,7 +157,7 @@ def _evaluate(world: World, task: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _live(world: World, task: Mapping[str, Any]) -> dict[str, Any]:
-    """The value of a live expression, whether it is the expected one, and what there is to say about it."""
+    """The value of a live expression, whether it is the expected one, and any diagnostics."""
     from potto.evaluating.live import DOES_NOT_HOLD, agrees
     from potto.runtime.answers.printing import largest
     from potto.runtime.answers.shown import bounds, format_estimate, interval, pair
@@ -164,7 +165,7 @@ def _live(world: World, task: Mapping[str, Any]) -> dict[str, Any]:
     file, expected = task["file"], task["expected"]
     try:
         answer = world.evaluate(file, task["text"])
-    except ProgramError as error:  # what the checker sees is said without us
+    except ProgramError as error:  # the checker reports this already
         whole = Span(0, len(task["text"]))
         said = [
             one if one.file == "<expression>" else Located("<expression>", replace(one.diagnostic, span=whole))
@@ -189,7 +190,7 @@ def _live(world: World, task: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _wanted(world: World, file: str, expected: str) -> Estimate | None:
-    """What a live expression should give; None if that cannot be evaluated."""
+    """What a live expression is expected to give; None if that cannot be evaluated."""
     try:
         return world.evaluate(file, expected).estimate
     except ProgramError:
@@ -213,7 +214,7 @@ def _rendered(error: ProgramError) -> str:
 
 
 def _point(world: World, task: Mapping[str, Any]) -> dict[str, Any]:
-    """A value, and the slopes by each parameter where they are numbers; all with error bars."""
+    """A value and its slopes by each parameter that is a number, all with error bars."""
     from potto.runtime.answers.shown import bounds, format_estimate, interval, tangent_of
 
     estimate = world.evaluate(task["file"], task["text"]).estimate
@@ -233,7 +234,7 @@ def _point(world: World, task: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _run(world: World, task: Mapping[str, Any]) -> dict[str, Any]:
-    """What a script shows."""
+    """What a script prints."""
     from potto.runtime.script import Shown
 
     lines: list[str] = []
@@ -266,7 +267,7 @@ def _sample(world: World, task: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _pixel(world: World, task: Mapping[str, Any]) -> dict[str, Any]:
-    """On which side of each surface a place of a picture is, and how far from it."""
+    """For each surface, which side a pixel is on and how far away it is."""
     from potto_lsp.sampling import sides
 
     return {"seen": sides(world, task["file"], task["surfaces"], task["values"], task["cell"])}
@@ -276,7 +277,7 @@ _VIEWS: dict[str, Any] = {}  # by file: what the views of its integrals have com
 
 
 def _view(world: World, task: Mapping[str, Any]) -> dict[str, Any]:
-    """What the page of an integral view asks."""
+    """The answer to a question of the integral view's page."""
     from potto.applications.integral_answers import Answers
 
     file = task["file"]

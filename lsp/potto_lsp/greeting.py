@@ -1,4 +1,7 @@
-"""The answer to `initialize`, which waits for nothing that it does not need. Owns `answer` and `greet`."""
+"""The answer to `initialize`, which waits for nothing that it doesn't need.
+
+Owns `answer` and `greet`.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +17,7 @@ from potto_lsp.wire import Outbox
 
 
 def answer(params: Any) -> dict[str, Any]:
-    """What the server is able to do, for a client. Raises `RequestError` for anything that is not a greeting."""
+    """What the server can do, for a client. Raises `RequestError` if `params` are no greeting."""
     if not isinstance(params, Mapping) or not isinstance(params.get("capabilities", {}), Mapping):
         raise RequestError(errors.INVALID_PARAMS, "the client's capabilities are missing")
     info = {"name": "potto", "version": __version__}
@@ -22,7 +25,8 @@ def answer(params: Any) -> dict[str, Any]:
 
 
 def greet(message: Any, outbox: Outbox) -> bool:
-    """Answer a first message at once if it is a greeting in order; whether it was. Else the server says what it is."""
+    """Answer the first message at once if it is a proper greeting. Returns whether it was; if not, the server answers
+    it."""
     match message:
         case {"id": int() | str() as id, "method": "initialize"} if not isinstance(id, bool):
             try:

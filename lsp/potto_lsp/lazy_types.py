@@ -16,7 +16,7 @@ _lock = RLock()
 
 
 class _Fields:
-    """Stands for the fields of a class that has not been made yet."""
+    """Stands for the fields of a class that was not made yet."""
 
     def __init__(self, make: Callable[[type], object]) -> None:
         self._make = make
@@ -28,12 +28,12 @@ class _Fields:
 
 
 def _owner(owner: type, fields: _Fields) -> type:
-    """The class above that has these fields."""
+    """The base class that these fields belong to."""
     return next(base for base in owner.__mro__ if vars(base).get("__attrs_attrs__") is fields)
 
 
 def _later(define: Callable[..., Any]) -> Callable[..., Any]:
-    """attrs' `define`, for later. The class stays the same object, so it has no slots."""
+    """A version of attrs' `define` that waits. The class remains the same object, so it gets no slots."""
 
     def defined(cls: Any = None, **how: Any) -> Any:
         if cls is None:
@@ -60,7 +60,7 @@ def _later(define: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def load() -> None:
-    """Import `lsprotocol.types`, unless somebody did."""
+    """Import `lsprotocol.types`, unless that was done already."""
     if "lsprotocol.types" in sys.modules:
         return
     import attrs

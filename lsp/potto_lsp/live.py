@@ -1,8 +1,8 @@
 """The values of live expressions (`#> e`) and of the points at which definitions are looked at.
 
-Owns `LiveValues`. Evaluated is only what an editor shows: live expressions of the files for which inlay hints were
-asked, then a point of each of their definitions. A value is known by the digests of all that its expression reaches, so
-that an edit elsewhere evaluates nothing.
+Owns `LiveValues`. Only what an editor shows is evaluated: the live expressions of files for which it asked for inlay
+hints, and then a point of each of their definitions. A value is stored under the digests of everything that its
+expression reaches, so an edit elsewhere evaluates nothing.
 """
 
 from __future__ import annotations
@@ -33,13 +33,14 @@ if TYPE_CHECKING:
     from potto_lsp.session import Session
 
 MOST = 200  # live expressions of one file that are evaluated
+TOGETHER = 20  # definitions whose points are asked for together
 MOST_ASKED = 50  # definitions of other files whose points are kept
-PAUSE = 0.15  # seconds between two requests to the client to ask for its hints again
+PAUSE = 0.15  # seconds between two requests that make the client refresh its hints
 
 
 @query
 def globals_of(db: Database, file: str, name: str) -> tuple[bytes, tuple[tuple[str, str], ...]]:
-    """The digest of a definition's term, and the definitions that it names."""
+    """The digest of a definition's term, and the definitions that it refers to."""
     return _reached(core(db, file, name).term)
 
 
@@ -61,7 +62,7 @@ def fingerprint(db: Database, file: str, text: str) -> bytes:
 
 
 class Key(Struct, frozen=True):
-    """Something to evaluate. The meaning is the digest of all that it reaches."""
+    """Something to evaluate. `meaning` is the digest of everything that it reaches."""
 
     do: str
     file: str
@@ -99,7 +100,15 @@ def _group_keys(db: Database, file: str, group: tuple[str, ...]) -> Keys:
 @query
 def looked_at_keys(db: Database, file: str) -> Keys:
     """The points of the first definitions that a file's expressions look at."""
-    return tuple([key for target in ide.looked_at(db, file)[:MOST] for key in point_keys(db, *target)])
+    targets = ide.looked_at(db, file)[:MOST]
+    some = [targets[start : start + TOGETHER] for start in range(0, len(targets), TOGETHER)]
+    return tuple([key for each in some for key in _some_point_keys(db, each)])
+
+
+@query(keep=128)
+def _some_point_keys(db: Database, targets: tuple[tuple[str, str], ...]) -> Keys:
+    """The points of some definitions. Grouped, since all of them are asked for at every key."""
+    return tuple([key for target in targets for key in point_keys(db, *target)])
 
 
 @query
@@ -153,7 +162,7 @@ def shown(point: ide.Point, value: Value) -> str:
 
 
 class LiveValues:
-    """What the expressions of the shown files give. For the thread that owns the database."""
+    """The values of the expressions in shown files. For the thread that owns the database."""
 
     def __init__(self, session: Session) -> None:
         self._session = session
@@ -168,7 +177,7 @@ class LiveValues:
     # What is known
 
     def values(self, file: str) -> list[tuple[Live, Value | None]]:
-        """The live expressions of a file with the values that are known; they are evaluated from now on."""
+        """The live expressions of a file, with the values known so far. From now on they are evaluated."""
         found = [(live, self._values.get(key)) for live, key in self._live(file)]
         if found and file not in self._shown:
             self._shown.add(file)
@@ -177,11 +186,11 @@ class LiveValues:
 
     @property
     def enabled(self) -> bool:
-        """Whether anything is evaluated unasked."""
+        """Whether anything is evaluated without being asked for."""
         return self._session.analysis.settings.get("live.enabled") is not False
 
     def at_points(self, file: str, name: str) -> list[tuple[ide.Point, Value]]:
-        """What is known of a definition at its points; they are evaluated from now on."""
+        """What is known of a definition at its points. From now on they are evaluated."""
         found = [(point, self._values.get(key)) for point, key in self._points(file, name)]
         if any(value is None for _, value in found) and (file, name) not in self._asked:
             self._asked[file, name] = None
@@ -191,8 +200,8 @@ class LiveValues:
         return [(point, value) for point, value in found if value is not None]
 
     def diagnostics(self, file: str) -> tuple[Located, ...]:
-        """What is wrong with the live expressions of an open file: as the checker sees them, and what came out. A bug
-        of ours costs these diagnostics alone."""
+        """What is wrong with the live expressions of an open file: what the checker found, and wrong values. A bug of
+        ours loses these diagnostics only."""
         try:
             return self._diagnostics(file)
         except Exception as error:
@@ -223,14 +232,14 @@ class LiveValues:
         return zip(_asked_points(db, file, name), point_keys(db, file, name))
 
     def _wanted(self) -> tuple[Keys, ...]:
-        """The live expressions of the shown files in the order of the text, and the points of their definitions and of
-        those that were asked about; the same objects as long as nothing is different."""
+        """The live expressions of the shown files in the order of the text, then the points of their definitions and of
+        those that were asked for. The same objects as before if nothing has changed."""
         db = self._session.analysis.db
         shown = [table(db, file) for table in (live_keys, looked_at_keys) for file in self._shown]
         return (*shown, *(point_keys(db, *each) for each in self._asked))
 
     def refresh(self) -> None:
-        """Evaluate what is shown and not known; forget what nobody shows any more."""
+        """Evaluate what is shown and not known yet; forget what is not shown any more."""
         if not self.enabled or not (self._shown or self._asked):
             return
         self._shown &= set(self._session.analysis.documents)
@@ -269,7 +278,7 @@ class LiveValues:
         self._tell("inlayHint", "live")
 
     def _tell(self, what: str, do: str) -> None:
-        """Have the client ask again for what shows values of this kind: when the last one has come, and not often."""
+        """Ask the client to refresh what shows these values: once the last one has arrived, and not too often."""
         now = time.monotonic()
         last = not any(waiting.do == do for waiting in self._waiting)
         due = last or now - self._told.get(what, 0.0) > PAUSE

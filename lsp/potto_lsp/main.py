@@ -17,7 +17,7 @@ from potto_lsp.greeting import greet
 from potto_lsp.wire import Outbox, messages
 
 logger = logging.getLogger(__name__)
-SWITCH = 0.0002  # seconds: with Python's 5 ms a question beside a busy thread takes as long
+SWITCH = 0.0002  # seconds; with Python's default of 5 ms, so long would a question wait for a busy thread
 
 
 def serve(address: tuple[str, int] | None = None, log: str | None = None) -> int:
@@ -28,7 +28,7 @@ def serve(address: tuple[str, int] | None = None, log: str | None = None) -> int
 
 
 def _log_to(path: str | None) -> None:
-    """Log to a file in detail, or to standard error what goes wrong."""
+    """Log everything to a file, or only errors to standard error."""
     kind = logging.FileHandler(path, encoding="utf-8") if path is not None else logging.StreamHandler()
     kind.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(name)s: %(message)s"))
     root = logging.getLogger()
@@ -42,7 +42,8 @@ def _serve_streams() -> int:
 
 
 def _talk(reader: BinaryIO, writer: BinaryIO) -> int:
-    """Serve the client at a pair of streams; the exit status. It is greeted before the server is loaded."""
+    """Serve the client at a pair of streams and return the exit status. The greeting is answered before the server is
+    loaded."""
     received, outbox = messages(reader), Outbox(writer)
     first = next(received, None)
     if first is None:
@@ -56,7 +57,7 @@ def _talk(reader: BinaryIO, writer: BinaryIO) -> int:
 
 
 def take_streams() -> tuple[BinaryIO, BinaryIO]:
-    """Standard input and output for us alone; what others write to the output goes to the errors."""
+    """Take standard input and output for ourselves. Whatever else is printed goes to standard error."""
     reader = os.fdopen(os.dup(0), "rb", buffering=1 << 16)
     writer = os.fdopen(os.dup(1), "wb", buffering=1 << 16)
     os.dup2(2, 1)
@@ -79,7 +80,7 @@ def _serve_socket(address: tuple[str, int]) -> int:
 
 
 def _leave(status: int) -> int:
-    """End at once, whatever the analysis is at."""
+    """End at once, whatever the analysis is doing."""
     logging.shutdown()
     sys.stderr.flush()
     os._exit(status)

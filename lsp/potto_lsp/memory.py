@@ -1,8 +1,8 @@
-"""How the garbage collector behaves in a server: never in the middle of a keystroke.
+"""The garbage collector in the server: it must never run for long in the middle of a keystroke.
 
-What is loaded and the memos of the first check live as long as the session, so they are taken out of collections; the
-rest is collected in small steps, the old generation seldom. (With the usual thresholds one edit took 274 ms.) Until
-the first check is over nothing is collected: nearly all that it makes stays.
+Loaded code and the memos of the first check live as long as the session, so they are exempt from collection. The rest
+is collected in small steps, the old generation seldom. (With the usual thresholds one edit took 274 ms.) Until the
+first check is over nothing is collected, since nearly everything that it makes stays.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ THRESHOLDS = (50_000, 50, 1_000)
 
 @contextmanager
 def loading() -> Iterator[None]:
-    """Load code without collections, and leave it out of all later ones."""
+    """Load code without collections, and exempt it from later ones."""
     gc.disable()
     try:
         yield
@@ -25,7 +25,7 @@ def loading() -> Iterator[None]:
 
 
 def settle() -> None:
-    """What is there now stays; from now on there are collections."""
+    """Exempt what exists now; from here on there are collections."""
     gc.freeze()
     gc.set_threshold(*THRESHOLDS)
     gc.enable()

@@ -1,7 +1,7 @@
-"""What a client tells without asking: documents, files, folders, settings.
+"""What a client reports without a question: documents, files, folders, settings.
 
-Owns `NOTIFICATIONS`: a method to the function that handles it on the thread that reads. Documents change here and now;
-what the analysis must know follows as an edit.
+Owns `NOTIFICATIONS`, the handler of each method. They run on the reading thread. Documents change at once; what the
+analysis must know follows as an edit.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ def _session(server: Server) -> Any:
 
 
 def initialized(server: Server, params: Any) -> None:
-    """The client is ready to be asked."""
+    """The client can now be asked."""
     session = _session(server)
     if session.client.can("workspace.didChangeWatchedFiles.dynamicRegistration"):
         watchers = [{"globPattern": pattern} for pattern in PATTERNS]
@@ -65,7 +65,7 @@ def _configure(server: Server, settings: Any) -> None:
 
 
 def did_change_configuration(server: Server, params: Any) -> None:
-    """Settings have changed; a client that can be asked for them is asked."""
+    """Settings have changed. If the client can be asked for them, it is."""
     if _session(server).client.can("workspace.configuration"):
         _ask_settings(server)
     else:
@@ -104,7 +104,7 @@ def did_close(server: Server, params: Any) -> None:
 
 
 def did_save(server: Server, params: Any) -> None:
-    """What is on disk is looked at again, for clients that watch no files."""
+    """Look at the disk again, for clients that don't watch files."""
     key = to_key(params["textDocument"]["uri"])
     watched = _session(server).client.can("workspace.didChangeWatchedFiles.dynamicRegistration")
 
@@ -156,7 +156,7 @@ def did_change_workspace_folders(server: Server, params: Any) -> None:
 
 
 def cancel_progress(server: Server, params: Any) -> None:
-    """A user does not want to wait any longer."""
+    """The user has cancelled something."""
     stop = _session(server).cancels.get(params["token"])
     if stop is not None:
         stop()

@@ -1,6 +1,6 @@
-"""The end of the server when its client is gone without a word.
+"""The server ends when its client has died.
 
-Owns `watch`. The end of standard input says so as well, but not if somebody else holds the pipe open.
+Owns `watch`. The end of standard input shows this too, but not if another process holds the pipe open.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""What a command answers, shown by the server itself, for clients that drop the answers of commands.
+"""Answers of commands, shown by the server for clients that drop them.
 
-Owns `Presenter`. A short text is a message; a longer one is a read-only document, a picture a file for its viewer. A
-client with commands of its own (`potto.…`, see `Client.presents`) shows all of it better and is left alone.
+Owns `Presenter`. A short text becomes a message, a longer one a read-only document, a picture a file for its viewer. A
+client with commands of its own (`potto.…`, see `Client.presents`) shows all of this better and is left alone.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class Presenter:
         self._folder: str | None = None
 
     def present(self, title: str, result: Mapping[str, Any]) -> None:
-        """Show the answer of a command. The title names the document."""
+        """Show the answer of a command. The title becomes the name of the document."""
         client = self._session.client
         if client.presents:
             return
@@ -55,6 +55,6 @@ class Presenter:
         self._session.request("window/showDocument", params, None)
 
     def close(self) -> None:
-        """Leave nothing behind."""
+        """Remove the files."""
         if self._folder is not None and os.path.isdir(self._folder):
             shutil.rmtree(self._folder, ignore_errors=True)

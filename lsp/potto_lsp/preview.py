@@ -1,6 +1,6 @@
-"""A picture of a function: a curve of one number, an image of two. For the evaluation process alone.
+"""A picture of a function: a curve for one number, an image for two. For the evaluation process alone.
 
-Owns `preview`. What a function is evaluated for is a batch: one call for the whole picture.
+Owns `preview`. The whole picture is one batch.
 """
 
 from __future__ import annotations
@@ -34,9 +34,9 @@ class NoPicture(Exception):
 def preview(
     world: World, file: str, name: str, box: Any, axes: Sequence[str], given: Mapping[str, str]
 ) -> dict[str, Any]:
-    """The picture of a function as a data URI, and a text that says what is shown. Raises NoPicture.
+    """The picture of a function as a data URI, and a text that describes it. Raises NoPicture.
 
-    `given`: what its parameters that are functions are, as texts; `axes` are the others.
+    `given`: texts for the parameters that are functions. `axes`: the ranges of the others.
     """
     module = Module(world, file)
     function = getattr(module, name, None)
@@ -62,7 +62,7 @@ def preview(
 def _given_values(
     module: Module, function: Function, axes: Sequence[str], given: Mapping[str, str], arguments: tuple[Array, ...]
 ) -> Array | None:
-    """The values over a batch of a function that is also given others; None if it has not so many numbers."""
+    """The values over a batch of a function that also takes functions; None if it has another number of numbers."""
     if len(axes) != len(arguments):
         return None
     try:
@@ -86,7 +86,7 @@ def _box(box: Any) -> tuple[tuple[float, float], tuple[float, float]]:
 
 
 def _values(function: Function, arguments: tuple[Array, ...]) -> Array | None:
-    """The values over a batch, given all at once, as a tuple or one by one; None if it takes none of these."""
+    """The values over a batch, passed at once, as a tuple or one by one; None if the function takes none of them."""
     shape = arguments[0].shape
     for groups in ((arguments,), ((arguments,),), tuple((one,) for one in arguments)):
         try:

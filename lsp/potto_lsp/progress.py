@@ -1,7 +1,7 @@
-"""Progress that the client shows while something takes long.
+"""Progress that the client shows when something takes long.
 
-Owns `Progress` of what is counted and `Working` of what just takes its time and can be cancelled. Both say nothing at
-all to clients that show none, and nothing while it is over soon.
+Owns `Progress`, for what can be counted, and `Working`, for what just takes time and can be cancelled. Both are silent
+for clients that show no progress, and for work that is over soon.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ SOON, PAUSE = 0.2, 0.1  # seconds: before the first word, and between words
 
 
 class Progress:
-    """One thing that goes on."""
+    """Progress of something that can be counted."""
 
     def __init__(self, session: Session, title: str) -> None:
         self._session, self._title = session, title
@@ -60,7 +60,7 @@ class Progress:
 
 
 class Working:
-    """Something that a user waits for. `token` is the client's, if it has given one; `cancel` stops it."""
+    """Something that a user waits for. `token` is the client's, if it gave one; `cancel` stops the work."""
 
     def __init__(self, session: Session, title: str, token: int | str | None, cancel: Callable[[], None]) -> None:
         self._session, self._title = session, title

@@ -1,7 +1,7 @@
-"""What is wrong, told to the client: pushed as it is found, or given when it is asked for.
+"""Diagnostics on their way to the client: pushed as they are found, or returned when it asks.
 
-Owns `Publisher`. Open files come first, the last edited one in front; then the rest of the workspace. What has not
-changed is not sent again. A client that asks itself (`textDocument/diagnostic`) is pushed nothing.
+Owns `Publisher`. Open files come first, the last edited one in front, then the rest of the workspace. What has not
+changed is not sent again. A client that asks by itself (`textDocument/diagnostic`) is pushed nothing.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ if TYPE_CHECKING:
     from potto_lsp.client import Client
     from potto_lsp.documents import Document
 
-TOGETHER = 20  # closed files that are looked at in one step
+TOGETHER = 20  # closed files per step
 Notify = Callable[[str, Any], None]
 
 
 @value
 class Report:
-    """What there is to say about a file, as messages; the same `id` means the same messages.
+    """What there is to say about a file, as messages. The same `id` means the same messages.
 
     found: what the checks have said, and what others have.
     """
@@ -41,7 +41,7 @@ class Report:
 
 
 class Publisher:
-    """The reports of all files and what of them the client has. For the thread that owns the database."""
+    """The reports on all files, and which of them the client has. For the thread that owns the database."""
 
     def __init__(self, analysis: Analysis, client: Client, notify: Notify) -> None:
         self._analysis, self._client, self._notify = analysis, client, notify
@@ -49,7 +49,7 @@ class Publisher:
         self._sent: dict[str, tuple[str, Document | None]] = {}
         self._ids = itertools.count(1)
         self._wrong_projects: set[str] = set()
-        self._shown: set[str] = set()  # files of which a client that asks has been told that something is wrong
+        self._shown: set[str] = set()  # files with errors that a client which asks was told of
         self.whole_workspace = True
         self.further: Callable[[str], tuple[Located, ...]] = lambda key: ()  # what others have to say about a file
 
@@ -61,7 +61,7 @@ class Publisher:
         found = checked, further = analysis.diagnostics(key), self.further(key)
         old = self._reports.get(key)
         if old is not None and not checked and not further and not old.items:
-            return old  # most files at most keystrokes: nothing was wrong, and nothing is
+            return old  # the usual case: nothing was wrong, and nothing is
         text, levels = analysis.text(key), analysis.levels(key)
         elsewhere = any(located.diagnostic.related for said in found for located in said)  # in files that may differ
         if old is not None and old.found == found and old.text is text and old.levels == levels and not elsewhere:
@@ -86,8 +86,8 @@ class Publisher:
         yield from self._each(1)
 
     def steps_again(self) -> Iterator[Callable[[], None]]:
-        """The same when all files have been checked: then most of those that are closed take microseconds, so there are
-        several to a step."""
+        """The same once all files have been checked. Most closed files then take microseconds, so one step handles
+        several."""
         yield from self._each(TOGETHER)
 
     def _each(self, together: int) -> Iterator[Callable[[], None]]:
@@ -105,8 +105,8 @@ class Publisher:
             self.push(key)
 
     def push(self, key: str) -> None:
-        """Check a file and tell the client if there is something new. An edited file is always told of: the client
-        moves what it shows by guessing."""
+        """Check a file, and send the client whatever is new. After an edit it is always sent: the client has moved its
+        marks by guessing."""
         report = self.report(key)
         document = self._analysis.document(key)
         sent = self._sent.get(key)
@@ -119,7 +119,7 @@ class Publisher:
             self._publish(self._analysis.uri(key), report.items, document)
 
     def closed(self, document: Document, key: str) -> None:
-        """A document was closed: what its URI was told is void, as the disk counts again."""
+        """A document was closed. Its URI is cleared, since now the file on disk counts."""
         self._sent.pop(key, None)
         if not self._client.pulls:
             self._publish(document.uri, [], None)
@@ -156,10 +156,10 @@ class Publisher:
         return {"uri": self._analysis.uri(key), "version": version, **self.answer(key, previous)}
 
     def gone(self, known: Iterable[str]) -> list[dict[str, Any]]:
-        """Empty reports of files that a client knows, or may still show, and that are not programs any more.
+        """Empty reports for files that a client knows, or may still show, and that are no programs any more.
 
-        A client that asks for a file a last time before it closes it shows that answer until it hears of it again, and
-        does not say that it does: files that were deleted or renamed while they were open are named every time.
+        A client that asks for a file one last time before it closes it keeps showing that answer until it hears of the
+        file again, without telling us. So files that were deleted or renamed while open are listed every time.
         """
         programs = set(self._analysis.programs())
         keys = [key for key in dict.fromkeys((*known, *sorted(self._shown))) if key not in programs]
@@ -168,7 +168,7 @@ class Publisher:
     # Project files
 
     def push_projects(self, projects: tuple[Project, ...]) -> None:
-        """What is wrong with project files; nobody asks for that, so it is pushed to every client."""
+        """What is wrong with project files. Nobody asks for that, so it is pushed to every client."""
         from potto.projects.project import problems_of
 
         for project in projects:

@@ -69,8 +69,9 @@ def sides(
     world: World, file: str, surfaces: Sequence[Mapping[str, Any]], values: Mapping[str, Any],
     cell: Mapping[str, float],
 ) -> list[dict[str, Any]]:  # fmt: skip
-    """Of each surface on which `side` a pixel's middle is (1, -1, or 0 where it has no value), and about how many
-    `pixels` off it is: within half of one it goes through the pixel. `cell`: the sides of the pixel."""
+    """For each surface, which `side` the middle of a pixel is on (1, -1, or 0 where it has no value), and roughly how
+    many `pixels` away it is: less than half of one means that it goes through the pixel. `cell`: the sides of the
+    pixel."""
     module = Module(world, file)
     around = [{}, *({axis: turn * size / 2} for axis, size in cell.items() for turn in (-1, 1))]
     found = []
@@ -109,8 +110,8 @@ def _middles(axis: Mapping[str, Any]) -> Array:
 
 
 def argument(module: Module, name: str, value: Any) -> Any:
-    """A number, a tuple of numbers, or the text of an expression in the module's names. `m.f` may also be a function
-    of a module that this one does not import."""
+    """A number, a tuple of numbers, or the text of an expression in the module's names. It may also be `m.f`, a
+    function of a module that this one doesn't import."""
     if isinstance(value, list):
         return tuple(argument(module, name, item) for item in value)
     if isinstance(value, str):
@@ -131,7 +132,7 @@ def _meant(module: Module, name: str, text: str) -> Any:
 
 
 def _home(module: Module, text: str) -> tuple[Module, str]:
-    """The module in whose names a text is an expression, and the expression there."""
+    """The module in whose names a text is to be read, and the expression to read there."""
     written = module._world.parse(text)
     if isinstance(written, nodes.Member):
         db, file = module._world.db, module._file

@@ -1,8 +1,8 @@
-"""The conversation with a client: from its first message to the exit status.
+"""The conversation with a client, from its first message to the exit status.
 
-Owns `Server`: the life of a session (`initialize` … `exit`), documents kept in step, and one answer to every request.
-It is carried by pygls (`carrier`), and runs on the thread that reads messages and never waits: what needs the database
-is a job for `work`, and its answer a future, which a cancellation ends as soon as it is read.
+Owns `Server`: the life of a session (`initialize` … `exit`), the documents, and one answer to every request. pygls
+carries it (`carrier`). It runs on the reading thread, which never waits: what needs the database is a job for `work`,
+and its answer a future that a cancellation ends at once.
 """
 
 from __future__ import annotations
@@ -34,15 +34,15 @@ logger = logging.getLogger(__name__)
 
 
 def leave() -> None:
-    """End at once: no question would ever be answered. A client notices that and may start another server."""
+    """End at once, since no question would ever be answered. The client notices, and may start another server."""
     logging.shutdown()
     os._exit(70)
 
 
 class Server(Carrier):
-    """One client: the messages that it sends, and where answers are written.
+    """One client: the messages that it sends, and where answers go.
 
-    `greeted`: the first message is a greeting, and was answered.
+    `greeted`: the first message was a greeting, and has been answered.
     """
 
     def __init__(self, messages: Iterable[Any], outbox: Outbox, greeted: bool = False) -> None:
@@ -63,7 +63,7 @@ class Server(Carrier):
             self.feature(method)(partial(self._noted, method, handle))
 
     def run(self) -> int:
-        """Talk until the client leaves; the exit status."""
+        """Talk until the client leaves. Returns the exit status."""
         received = iter(self._messages)
         if self._greeted:
             self._initialize(next(received).get("params"))
@@ -118,7 +118,7 @@ class Server(Carrier):
     # Asking the analysis
 
     def edit(self, change: Callable[[], object]) -> None:
-        """Change something that the analysis sees; files are checked afterwards."""
+        """Change something that the analysis sees, and check the files afterwards."""
         assert self.worker is not None
         self._edits += 1
 
@@ -150,8 +150,8 @@ class Server(Carrier):
         return future
 
     def _ended(self, job: Job, future: Future[Any]) -> None:
-        """Stop what works on a question that was cancelled, and let go of what it was about: the job knows the future,
-        and this the job."""
+        """Stop work on a question that was cancelled, and release what it held: the job refers to the future, and the
+        future to the job."""
         if future.cancelled():
             job.claim()
             if self.worker is not None:
@@ -161,7 +161,7 @@ class Server(Carrier):
         job.outdated = bool
 
     def _outdated(self, ask: Ask, document: Document) -> bool:
-        """Whether a question came too late for the text that it was about."""
+        """Whether a question is about an older version of the document."""
         return ask.analysis.document(ask.file) is not document
 
     def _answer(self, future: Future[Any], job: Job, feature: Feature, ask: Ask, document: Document | None) -> None:
@@ -185,7 +185,7 @@ class Server(Carrier):
                 _finish(future, job, result)
 
     def _version(self, feature: Feature, ask: Ask, document: Document | None) -> Version:
-        """What a failure counts for: a method on a version of a file, or on the workspace until the next edit."""
+        """What a failure is counted for: a method on a version of a file, or on the workspace until the next edit."""
         uri = about(ask.params) or ""
         named = document or self.documents.get(uri)
         return feature.method, uri, self._edits if named is None else named.version
@@ -197,7 +197,7 @@ class Server(Carrier):
         self.protocol.notify(method, params)
 
     def request(self, method: str, params: Any, reply: Reply | None = None) -> None:
-        """Ask the client something; `reply` is called on the thread that reads."""
+        """Ask the client something. `reply` is called on the reading thread."""
 
         def replied(future: Future[Any]) -> None:
             try:
@@ -211,7 +211,7 @@ class Server(Carrier):
 
 
 def _nothing(job: Job) -> None:
-    """What there is to do for a question that was answered."""
+    """What is left to do for a question that was answered."""
 
 
 def _defer(future: Future[Any], job: Job, deferred: Deferred) -> None:

@@ -1,7 +1,7 @@
-"""What a session knows once its client has said hello.
+"""What a session knows once its client has introduced itself.
 
-Owns `Session`: the client, the analysis, the publisher, the evaluation process and the way back to the client. All of
-it but `notify` and `request` belongs to the thread that owns the database.
+Owns `Session`: the client, the analysis, the publisher, the evaluation process and the way back to the client.
+Everything but `notify` and `request` belongs to the thread that owns the database.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     from potto_lsp.live import LiveValues
     from potto_lsp.publishing import Publisher
 
-TREES = 50  # files after whose check the trees of those that are closed are forgotten
-Reply = Callable[[Any, Any], None]  # what a client answered, and its error; one of the two is None
+TREES = 50  # checked files after which the trees of closed ones are forgotten
+Reply = Callable[[Any, Any], None]  # the client's answer and its error; one of them is None
 
 
 class Session:
@@ -45,17 +45,17 @@ class Session:
     ) -> None:
         self.client, self.notify, self.request = client, notify, request
         self.later = later  # do something on the thread that owns the database
-        self.cancels: dict[int | str, Callable[[], None]] = {}  # what a user can stop, by the token of its progress
+        self.cancels: dict[int | str, Callable[[], None]] = {}  # what a user can cancel, by progress token
         self.presenter = Presenter(self)
         self.tokens: dict[str, Colours] = {}
         self.checked = False
         self.to_prepare: set[str] = set()  # files that were opened
         self._unknown_lints: list[str] = []
-        self.to_keep: set[str] = set()  # saved files, of which it is to be kept what was found out about them
+        self.to_keep: set[str] = set()  # saved files whose diagnostics are to be kept for later sessions
         self._progress = Progress(self, "Potto: checking the workspace")
 
     def load(self) -> Database:
-        """Load what the work needs. Runs on the thread that will own the database, after the greeting was answered."""
+        """Load what the work needs. Runs on the thread that will own the database, after the greeting."""
         with memory.loading():
             from potto_lsp.analysis import Analysis
             from potto_lsp.evaluation import Evaluator
@@ -71,7 +71,7 @@ class Session:
 
     @cached_property
     def live(self) -> LiveValues:
-        """The values of live expressions. Slow to import, so not before the first diagnostics are told."""
+        """The values of live expressions. Slow to import, so this waits for the first diagnostics."""
         with memory.loading():
             from potto_lsp.live import LiveValues
         return LiveValues(self)
@@ -97,7 +97,7 @@ class Session:
         self._tell_unknown_lints()
 
     def _tell_unknown_lints(self) -> None:
-        """Codes in the client's settings that mean nothing are told once."""
+        """Report unknown lint codes in the client's settings, once each."""
         from potto.projects.project import LINTS
 
         lints = self.analysis.settings.get("lints")
@@ -108,8 +108,7 @@ class Session:
         self._unknown_lints = unknown
 
     def idle(self) -> Iterator[Callable[[], None] | None]:
-        """The steps of what is done when there is nothing else to do; a None when it is told what is wrong with the
-        open files."""
+        """The steps of idle work. Yields None once the diagnostics of open files have been sent."""
         if self.checked:
             opened = len(self.analysis.documents)
             for number, step in enumerate(self.publisher.steps_again()):
@@ -126,15 +125,15 @@ class Session:
         yield self.live.refresh
 
     def _first_check(self) -> Iterator[Callable[[], None] | None]:
-        """The first check of the whole workspace, which may take a while: with progress."""
+        """The first check of the whole workspace. It may take a while, so it shows progress."""
         if self.publisher.whole_workspace:
             yield self.analysis.call_helpers  # they start while what is open is checked here
         steps = list(self.publisher.steps())
         for number, step in enumerate(steps):
-            if number == len(self.analysis.documents):  # what is open is told; the next thing is to be asked about it
+            if number == len(self.analysis.documents):  # open files are done, and questions about them come next
                 yield None
                 yield self._load_features
-                yield from steps[:number]  # what an earlier session had found is found again, for the edits to come
+                yield from steps[:number]  # what an earlier session found is found again, for the edits to come
             while self.analysis.helpers_have_found:
                 yield self.analysis.take_over
             yield step
@@ -158,7 +157,7 @@ class Session:
         self.analysis.keep(key)
 
     def _load_features(self) -> None:
-        """Load all adapters, so that the first question waits for none."""
+        """Load all adapters, so that the first question doesn't wait for its own."""
         with memory.loading():
             for feature in FEATURES.values():
                 feature.load()
@@ -178,13 +177,13 @@ class Session:
         self.presenter.close()
 
     def diagnostics_changed(self) -> None:
-        """Something else than an edit changed what there is to say."""
+        """Diagnostics have changed for another reason than an edit."""
         if self.client.pulls and self.client.can("workspace.diagnostics.refreshSupport"):
             self.request("workspace/diagnostic/refresh", None, None)
 
 
 def settings_of(settings: Any) -> Mapping[str, Any]:
-    """Settings, with or without the `potto` around them, nested ones also under dotted names."""
+    """Settings, with or without `potto` around them. Nested ones are also found under dotted names."""
     if isinstance(settings, Mapping) and isinstance(settings.get("potto"), Mapping):
         settings = settings["potto"]
     if not isinstance(settings, Mapping):

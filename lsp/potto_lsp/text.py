@@ -37,7 +37,8 @@ def line_starts(text: str) -> list[int]:
 class Lines(Struct, frozen=True):
     """Where the lines of a text start, in blocks: an edit makes one or two new blocks and moves the others.
 
-    offsets: where each block starts; numbers: of its first line; blocks: the starts of its lines, relative to it.
+    offsets: where each block starts; numbers: the number of its first line; blocks: the starts of its lines, relative
+    to it.
     """
 
     offsets: list[int]
@@ -56,8 +57,8 @@ class Lines(Struct, frozen=True):
         return self.numbers[block] + bisect_right(self.blocks[block], offset - self.offsets[block]) - 1
 
     def replaced(self, text: str, start: int, end: int, shift: int) -> Lines:
-        """The lines of `text`, in which something else stands between two offsets of the text before; what follows has
-        moved by `shift`."""
+        """The lines of `text`, which differs from the text before between two offsets; everything after has moved by
+        `shift`."""
         # A CR or LF at the border may join or leave the line end before it: begin one line above.
         first = bisect_right(self.numbers, max(self.line_of(start) - 1, 0)) - 1
         last = bisect_right(self.offsets, end)
@@ -142,8 +143,8 @@ class Text(Struct, frozen=True, dict=True):
 
     @cached_property
     def _wide(self) -> tuple[list[int], list[int]]:
-        """Where code points stand that are longer than one unit, and by how much those before each are in all. With
-        them a position costs the same in a line of any length."""
+        """Where code points longer than one unit are, and the extra length of those before each. This makes converting
+        a position equally fast in lines of any length."""
         if self.encoding == "utf-32" or self.text.isascii():
             return [], [0]
         pattern = _BEYOND_ASCII if self.encoding == "utf-8" else _ASTRAL
@@ -152,7 +153,7 @@ class Text(Struct, frozen=True, dict=True):
         return wide, list(accumulate(longer, initial=0))
 
     def replaced(self, start: int, end: int, inserted: str) -> Text:
-        """The text with another one between two offsets; only the lines nearby are looked at again."""
+        """The text with something else between two offsets. Only the lines nearby are scanned again."""
         start, end = min(start, end), max(start, end)
         text = self.text[:start] + inserted + self.text[end:]
         new = Text(text, self.encoding)

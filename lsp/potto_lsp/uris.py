@@ -1,6 +1,6 @@
-"""Between the URIs of a client and the keys of the database.
+"""Conversions between a client's URIs and the keys of the database.
 
-A key is a normalized absolute path; of what lies on no disk (`untitled:Untitled-1`) it is the URI in angle brackets.
+A key is a normalized absolute path. For what is not on a disk (`untitled:Untitled-1`) it is the URI in angle brackets.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ _DRIVE = re.compile(r"^/[A-Za-z]:")
 
 
 def to_key(uri: str) -> str:
-    """How the database calls what a URI names."""
+    """The key for a URI."""
     try:
         parts = urlsplit(uri)
     except ValueError:  # a broken address in brackets
@@ -30,7 +30,7 @@ def to_key(uri: str) -> str:
 
 
 def to_uri(key: str) -> str:
-    """A URI for a key, as we write it ourselves; a client may write the same one in another way."""
+    """A URI for a key, as we write it; a client may write the same one differently."""
     if key.startswith("<"):
         return key[1:-1]
     path = key.replace(os.sep, "/")

@@ -30,7 +30,7 @@ from potto.source import Span
 
 logger = logging.getLogger(__name__)
 FOLDER = "checked-"
-MOST_FILES = 500  # that are kept; the longest unused go first
+MOST_FILES = 500  # verdicts kept; the least recently used go first
 MOST_READ = 5_000  # texts and folders that a verdict may rest on
 MOST_BYTES = 4_000_000  # of one verdict
 
@@ -47,7 +47,7 @@ class Verdicts:
         self._kept: dict[str, tuple[Located, ...]] = {}
 
     def of(self, file: str) -> tuple[Located, ...] | None:
-        """What was said about a file, if it holds now."""
+        """What was said about a file, if it still holds."""
         path = self._path(file)
         loaded = None if path is None else _load(path, file)
         if loaded is None:
@@ -59,7 +59,7 @@ class Verdicts:
         return found
 
     def keep(self, file: str, found: tuple[Located, ...], query: str) -> None:
-        """Keep what the query of this name has found out about a file."""
+        """Keep what the query of this name found out about a file."""
         path = self._path(file)
         if path is None or self._kept.get(file) is found:
             return
@@ -114,7 +114,7 @@ def program_digest() -> str:
 
 
 def _is_ours(folder: Path) -> bool:
-    """Whether only this user can have written into a folder; it is made if it is not there."""
+    """Whether only this user can have written into a folder. Makes it if it doesn't exist."""
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         status = folder.lstat()
@@ -126,7 +126,7 @@ def _is_ours(folder: Path) -> bool:
 
 
 def _load(path: Path, file: str) -> tuple[Reads, tuple[Located, ...]] | None:
-    """The verdict in a file; None if there is none, or none that is whole."""
+    """The verdict in a file; None if it is missing or damaged."""
     try:
         if path.stat().st_size > MOST_BYTES:
             return None
@@ -145,7 +145,7 @@ def _load(path: Path, file: str) -> tuple[Reads, tuple[Located, ...]] | None:
 
 
 def _store(path: Path, data: Mapping[str, Any]) -> None:
-    """Write a verdict in one step; that it can't be written costs time at the next start, nothing else."""
+    """Write a verdict in one step. If that fails, the next start takes longer, nothing else."""
     temporary = None
     try:
         body = json.dumps(data, separators=(",", ":")).encode()

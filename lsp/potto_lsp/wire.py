@@ -1,7 +1,7 @@
-"""Messages on a stream: `Content-Length` and JSON, as the base protocol has it.
+"""Messages on a stream: `Content-Length` and JSON, as in the base protocol.
 
-Owns `messages`, which reads them, `framed`, their bytes, and `Outbox`, which writes them from any thread without making
-it wait: a client that does not read for a while must not keep the server from reading, or both would wait for ever.
+Owns `messages`, which reads them, `framed`, which makes their bytes, and `Outbox`, which writes them from any thread
+without waiting: if the server stopped reading because a client does not read for a while, both would wait forever.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import json
 import logging
 import os
 import select
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from queue import SimpleQueue
 from threading import Lock, Thread
 from typing import Any, BinaryIO
@@ -44,7 +44,7 @@ def _messages(stream: BinaryIO) -> Iterator[Any]:
 
 
 def _header(stream: BinaryIO) -> int | None:
-    """The length of the next body; None at the end. Field names are in any case; lines may end in LF alone."""
+    """The length of the next body; None at the end. Field names are in any case; lines may end in a bare LF."""
     length: int | None = None
     while line := stream.readline(4096):
         line = line.strip()
@@ -71,16 +71,17 @@ def _length(value: bytes) -> int | None:
 
 
 class Encoded:
-    """A result that is JSON already: answers about whole files are kept in pieces as they are sent."""
+    """A list that is already JSON: answers about whole files are kept in pieces, as they are sent. The items of a piece
+    are separated by commas; empty pieces don't count."""
 
-    __slots__ = ("text",)
+    __slots__ = ("pieces",)
 
-    def __init__(self, text: str) -> None:
-        self.text = text
+    def __init__(self, pieces: Iterable[bytes]) -> None:
+        self.pieces = [piece for piece in pieces if piece]
 
     def decoded(self) -> Any:
-        """What it says."""
-        return json.loads(self.text)
+        """The list."""
+        return json.loads(b"[%b]" % b",".join(self.pieces))
 
 
 def framed(message: dict[str, Any]) -> bytes:
@@ -88,18 +89,26 @@ def framed(message: dict[str, Any]) -> bytes:
     # Escaped to ASCII: half of a surrogate pair, which JSON may carry, would not go into UTF-8.
     result = message.get("result")
     if isinstance(result, Encoded):
-        rest = json.dumps({name: value for name, value in message.items() if name != "result"}, separators=(",", ":"))
-        body = f'{rest[:-1]},"result":{result.text}}}'.encode("ascii")
-    else:
-        body = json.dumps(message, separators=(",", ":")).encode("ascii")
+        return _framed_list({name: value for name, value in message.items() if name != "result"}, result.pieces)
+    body = json.dumps(message, separators=(",", ":")).encode("ascii")
     return b"Content-Length: %d\r\n\r\n%b" % (len(body), body)
 
 
+def _framed_list(message: dict[str, Any], pieces: list[bytes]) -> bytes:
+    """A message with a long list as its result. That may be megabytes, so it is copied only once."""
+    head = json.dumps(message, separators=(",", ":"))[:-1].encode("ascii") + b',"result":['
+    length = len(head) + sum(map(len, pieces)) + max(len(pieces) - 1, 0) + 2
+    first, *rest = pieces or [b""]
+    whole = [b"Content-Length: %d\r\n\r\n%b%b" % (length, head, first), *rest]
+    whole[-1] += b"]}"
+    return b",".join(whole)
+
+
 class Outbox:
-    """Writes messages in the order in which they are put.
+    """Writes messages in order.
 
     What the client's pipe takes at once is written at once; a thread writes the rest. (A thread that woke for every
-    message took a third as long as finding out what the messages say: both want the interpreter.)
+    message took a third as long as producing the messages: both need the interpreter.)
     """
 
     def __init__(self, stream: BinaryIO) -> None:
@@ -111,11 +120,11 @@ class Outbox:
         self._thread.start()
 
     def put(self, message: dict[str, Any]) -> None:
-        """Send a message now or some time soon."""
+        """Queue a message."""
         self.write(framed(message))
 
     def write(self, data: bytes) -> None:
-        """Send a framed message now or some time soon."""
+        """Queue a framed message."""
         left = data
         with self._lock:
             if not self._left and self._pipe is not None:
@@ -125,7 +134,7 @@ class Outbox:
                 self._queue.put(left)
 
     def close(self, seconds: float = 2.0) -> None:
-        """Write what is left, for at most so long."""
+        """Write what is left, for at most so many seconds."""
         self._queue.put(None)
         self._thread.join(seconds)
 
@@ -145,14 +154,14 @@ class Outbox:
 
 
 class _Pipe:
-    """A stream of which can be told how much it takes without waiting."""
+    """A pipe that can tell how much it takes without waiting."""
 
     def __init__(self, descriptor: int) -> None:
         self._descriptor, self._poll = descriptor, select.poll()
         self._poll.register(descriptor, select.POLLOUT)
 
     def write(self, data: bytes) -> bytes:
-        """Write what can be written now; what is left."""
+        """Write as much as possible without waiting. Returns what is left."""
         rest = memoryview(data)
         try:
             while rest and self._poll.poll(0) == [(self._descriptor, select.POLLOUT)]:

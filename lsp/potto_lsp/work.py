@@ -24,16 +24,16 @@ if TYPE_CHECKING:
     from potto.query import Database
 
 logger = logging.getLogger(__name__)
-LONG = 0.05  # seconds after which even a quick question gives way to an edit
-PATIENCE = 8  # how often a job gives way to questions; then it is finished first, for else it might never be
+LONG = 0.05  # seconds after which an edit interrupts even a quick question
+PATIENCE = 8  # how often a job gives way to questions; after that it is finished first, or it might never be
 
 _claims = Lock()
 
 
 class Job(Struct, eq=False):
-    """Something to do. Whoever `claim`s it may answer it, and nobody else.
+    """Something to do. Whoever claims it may answer it, and nobody else.
 
-    `run` and `drop` are given the job, so that none refers to itself: a document stays no longer than its questions.
+    `run` and `drop` are given the job, so that neither refers to it: a document is kept no longer than its questions.
     """
 
     kind: Literal["edit", "quick", "diagnosis", "slow", "idle"]
@@ -45,7 +45,7 @@ class Job(Struct, eq=False):
     _claimed: bool = False
 
     def claim(self) -> bool:
-        """True for the first that asks."""
+        """True for the first caller."""
         with _claims:
             claimed, self._claimed = self._claimed, True
             return not claimed
@@ -56,8 +56,11 @@ class Job(Struct, eq=False):
 
 
 class Worker:
-    """A queue of jobs and the thread that does them. `idle` gives the steps of what to do when there are none, those
-    for which slow questions wait first, and a None behind them; `dead` is called if it cannot start."""
+    """A queue of jobs and the thread that does them.
+
+    `idle` gives the steps of idle work, and a None after those that slow questions wait for. `dead` is called if the
+    thread cannot start.
+    """
 
     def __init__(
         self,
@@ -78,11 +81,11 @@ class Worker:
         self._thread = Thread(target=self._work, name="potto-analysis", daemon=True)
 
     def start(self) -> None:
-        """Begin; what is put before waits."""
+        """Start. Jobs that were queued before have waited."""
         self._thread.start()
 
     def put(self, job: Job) -> None:
-        """Add a job, from any thread. What runs gives way if it is less urgent."""
+        """Queue a job, from any thread. A running job that is less urgent gives way."""
         self._inbox.put(job)
         running, db = self._running, self._db
         if running is None or db is None:
@@ -98,7 +101,7 @@ class Worker:
             db.cancel()
 
     def cancelled(self, job: Job) -> None:
-        """Nobody waits for a job any more."""
+        """Nobody waits for this job any more."""
         if self._running is job and self._db is not None:
             self._db.cancel()
 
@@ -115,7 +118,7 @@ class Worker:
                 self._do(job)
 
     def _next(self) -> Job | None:
-        """The next job; None after a step of what is done in idle time."""
+        """The next job; None after a step of idle work."""
         self._receive(wait=False)
         if self._quick:
             return self._quick.popleft()
@@ -150,7 +153,7 @@ class Worker:
             return
 
     def check_again(self) -> None:
-        """Start the work of idle time over."""
+        """Start the idle work over."""
         self._inbox.put(None)
 
     def _do(self, job: Job) -> None:
@@ -174,7 +177,7 @@ class Worker:
             self._running = None
 
     def _give_way(self, job: Job) -> None:
-        """Return to a job after all that is more urgent; to a step of idle time only if no edit starts these over."""
+        """Come back to a job after everything more urgent; to idle work only if no edit has started that over."""
         if job.kind == "idle":
             self._steps = chain([lambda: job.run(job)], self._steps or ())
         elif not job.claimed:

@@ -16,7 +16,7 @@ from potto.source import Span
 
 
 class Location(Struct, frozen=True):
-    """A place to go to: `span` is what to select, `full` all that belongs to it (a whole definition)."""
+    """A place to go to. `span` is what to select, `full` the whole definition around it."""
 
     file: str
     span: Span
@@ -104,7 +104,7 @@ class Completion(Struct, frozen=True):
 
 
 class Completions(Struct, frozen=True):
-    """Proposals for the word at `span`. `incomplete`: ask again when more is typed."""
+    """Proposals for the word at `span`. `incomplete`: ask again as more is typed."""
 
     span: Span
     items: tuple[Completion, ...]
@@ -112,7 +112,7 @@ class Completions(Struct, frozen=True):
 
 
 class ParameterText(Struct, frozen=True):
-    """One parameter: where it stands in the signature's label, and what is to say about it."""
+    """One parameter: its place in the signature's label, and what there is to say about it."""
 
     span: Span
     documentation: str = ""
@@ -200,10 +200,11 @@ ActionKind = Literal[
 
 
 class CodeAction(Struct, frozen=True):
-    """Something that can be done here. `change` is None until `resolve_code_action` was asked.
+    """Something that can be done here.
 
-    `codes` are those of the diagnostics that it fixes, `spans` their places. `preferred`: the obvious one. `disabled`
-    says why it can't be done. `rename_at`: after the change, start a rename there. `data` is for resolving.
+    `change` is None until `resolve_code_action` was asked. `codes` are those of the diagnostics that it fixes, `spans`
+    their places. `preferred`: the obvious choice. `disabled` says why it can't be done. `rename_at`: start a rename
+    there after the change.
     """
 
     title: str
@@ -257,7 +258,8 @@ TOKEN_MODIFIERS = (
 
 
 class SemanticToken(Struct, frozen=True):
-    """A coloured word: a type of `TOKEN_TYPES` and modifiers of `TOKEN_MODIFIERS`. Never over a line's end."""
+    """A coloured word: a type from `TOKEN_TYPES` and modifiers from `TOKEN_MODIFIERS`. It never crosses the end of a
+    line."""
 
     span: Span
     type: str
@@ -268,7 +270,7 @@ class SemanticToken(Struct, frozen=True):
 
 
 class Fold(Struct, frozen=True):
-    """Something that can be folded: from the end of its first line to the end of `span`."""
+    """Something to fold, from the end of its first line to the end of `span`."""
 
     span: Span
     kind: Literal["region", "comment", "imports"]

@@ -45,6 +45,7 @@ class TwoSided(Event, frozen=True):
 
     fold: or its sections along the variable appear or merge just here. Without a surface: some run along the variable.
     kink: the integrand has a kink where the surface is, all along the variable; without one, it is a number's.
+    hidden: rounding hides whether the surface lies there, and what that changes is part of the errors.
     """
 
     variable: str
@@ -52,6 +53,7 @@ class TwoSided(Event, frozen=True):
     other: Term | None = None
     fold: bool = False
     kink: bool = False
+    hidden: bool = False
 
 
 class Fold(Event, frozen=True):
@@ -288,6 +290,14 @@ class Events:
             if isinstance(event, kinds or Event):
                 mask[slice(None) if members is None else members] = True
         return mask
+
+    def uncounted(self, size: int) -> Bools:
+        """The members of a batch that met something that their errors do not count."""
+        rest = Events()
+        for event, members in self:
+            if not (isinstance(event, TwoSided) and event.hidden):
+                rest.note(event, members)
+        return rest.touched(size)
 
     def known(self, *kinds: type[Event]) -> bool:
         """Whether it is known of each of these kinds who met it."""

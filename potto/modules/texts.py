@@ -132,7 +132,7 @@ def pieces(db: Database, file: str) -> tuple[str, ...]:
     return cut(text, db.former(pieces, (file,)) or ()) if isinstance(text, str) else ()
 
 
-@query(cuts=True)
+@query
 def groups_of_pieces(db: Database, file: str) -> tuple[tuple[str, ...], ...]:
     """The pieces of a file in groups, mostly the same ones as before an edit."""
     found = pieces(db, file)
@@ -219,11 +219,17 @@ def piece(db: Database, text: str, diffeo: bool) -> Piece:
     return Piece(text, found, texts, places, tuple(imports), tuple(statements), definitions, nameless)
 
 
+@query(keep=128)
+def _group(db: Database, group: tuple[str, ...], diffeo: bool) -> tuple[Piece, ...]:
+    """What a group of pieces holds."""
+    return tuple([piece(db, text, diffeo) for text in group])
+
+
 @query
 def layout(db: Database, file: str) -> Layout:
     """What is where in a file. Read the projections below instead, they stand still."""
     diffeo = is_diffeo(file)
-    found = tuple([piece(db, text, diffeo) for text in pieces(db, file)])
+    found = tuple([one for group in groups_of_pieces(db, file) for one in _group(db, group, diffeo)])
     starts = accumulate([len(one.text) for one in found[:-1]], initial=0) if found else ()
     return Layout(found, tuple(starts), _place(found, db.former(layout, (file,))))
 
@@ -360,8 +366,18 @@ def import_starts(db: Database, file: str) -> tuple[int, ...]:
 def syntax_diagnostics(db: Database, file: str) -> tuple[Diagnostic, ...]:
     """What the parser has to say about a file, with absolute spans."""
     diffeo, start, found = is_diffeo(file), 0, list[Diagnostic]()
-    for text in pieces(db, file):
-        found += [shift(diagnostic, start) for diagnostic in _piece_diagnostics(db, text, diffeo)]
+    for group in groups_of_pieces(db, file):
+        found += [shift(diagnostic, start) for diagnostic in _group_diagnostics(db, group, diffeo)]
+        start += sum(map(len, group))
+    return tuple(found)
+
+
+@query(keep=128)
+def _group_diagnostics(db: Database, group: tuple[str, ...], diffeo: bool) -> tuple[Diagnostic, ...]:
+    """What it has to say about a group of pieces, relative to the first one."""
+    start, found = 0, list[Diagnostic]()
+    for text in group:
+        found += [shift(diagnostic, start, None) for diagnostic in _piece_diagnostics(db, text, diffeo)]
         start += len(text)
     return tuple(found)
 

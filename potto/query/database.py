@@ -1,4 +1,4 @@
-"""`Database`: inputs, reading, threads, events, and what is forgotten."""
+"""`Database`: inputs, reading, threads, events and forgetting."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ MOST_ARGUMENTS = 200_000
 
 
 class Database(Engine):
-    """Inputs and memos of one world. Every query takes it as its first argument."""
+    """Inputs and memos. Every query takes the database as its first argument."""
 
     def __init__(self) -> None:
         super().__init__()
-        #: Called once for an input that is read and was never set: gives `(value, durability)`, or None for "none".
-        #: Sound without a new revision, because nothing can have read it before.
+        #: Called once for an input that is read but was never set. Gives `(value, durability)`, or None for "none".
+        #: This needs no new revision: nothing can have read the input before.
         self.on_missing_input: Callable[[Hashable], tuple[Any, int] | None] | None = None
         self._inputs: dict[Hashable, Input] = {}
         self._limits: dict[Query, int] = {}
@@ -29,7 +29,7 @@ class Database(Engine):
     # Inputs
 
     def set_input(self, key: Hashable, value: Any, durability: int = 0) -> bool:
-        """Set an input; True if it changed. An equal value changes nothing and costs no revision."""
+        """Set an input. Returns whether it changed: setting an equal value starts no new revision."""
         with self.evaluating():
             self._forbid_in_queries("set_input")
             old = self._inputs.get(key)
@@ -40,18 +40,19 @@ class Database(Engine):
             differs = old.value is MISSING or not same(old.value, value)
             if not differs and old.durability == durability:
                 return False
-            self.revision += 1
+            self._next_revision()
             self._evict()
             for level in range(max(old.durability, durability) + 1):
                 self._last_changed[level] = self.revision
             old.durability = durability
             if differs:
                 old.value, old.changed_at = value, self.revision
+                self._changes[self.revision].add(old)
                 self._log("input", "input", (key,))
             return differs
 
     def get_input(self, key: Hashable, default: Any = None) -> Any:
-        """The value of an input; inside a query it is noted as read, also when it was never set."""
+        """The value of an input. A running query is recorded as its reader, even if the input was never set."""
         if self._owner != get_ident():
             with self.evaluating():
                 return self.get_input(key, default)
@@ -63,7 +64,8 @@ class Database(Engine):
         return default if node.value is MISSING else node.value
 
     def _load(self, key: Hashable) -> Input:
-        """An input that is read and was never set. What the loader reads is not read by the query that runs."""
+        """Load an input that is read but was never set. What the loader itself reads is not recorded for the running
+        query."""
         frame, self._frame = self._frame, None
         try:
             loaded = self.on_missing_input(key) if self.on_missing_input is not None else None
@@ -87,7 +89,7 @@ class Database(Engine):
         with self.evaluating():
             return tuple((key, node) for key, node in self._inputs.items())
 
-    # What is found elsewhere, see `travel`
+    # Answers found elsewhere, see `travel`
 
     def input(self, key: Hashable) -> Input:
         """An input, loaded if it was never read."""
@@ -101,7 +103,7 @@ class Database(Engine):
             return self._demand_unread(query, args)
 
     def is_current(self, node: Node) -> bool:
-        """Whether a node is what is read now, brought up to date if it has to be."""
+        """Whether a node is what a reader would get now. Brings it up to date first if necessary."""
         source = node.source
         if source is not None and source.verified_at < self.revision:
             self._demand_unread(source.query, source.args)
@@ -109,7 +111,8 @@ class Database(Engine):
         return True
 
     def adopt(self, table: Callable[..., Any], args: tuple[Hashable, ...], value: Any, deps: Iterable[Node]) -> Memo:
-        """Take an answer that was found elsewhere from what `deps` are here now. One that is known here stays."""
+        """Take over an answer that was found elsewhere from the nodes `deps`. An answer that is already known here
+        stays."""
         self._forbid_in_queries("adopt")
         if self._cancelled == self._evaluation:
             raise Cancelled
@@ -121,14 +124,14 @@ class Database(Engine):
             memo = memos[args] = Memo(query, args)
         elif memo.verified_at >= self.revision:
             return memo
-        memo.put(value, self.revision)
+        memo.put(value, self.revision, self._changes[self.revision])
         self._depend(memo, dict.fromkeys(deps))
         return memo
 
     # Reading
 
     def entry(self, table: Callable[..., Mapping[K, V] | Parted], args: tuple[Hashable, ...], key: K) -> V | None:
-        """What the mapping `table(db, *args)` has under `key`, reading (and depending on) that alone."""
+        """The value under `key` in the mapping `table(db, *args)`. The reader depends on this entry alone."""
         if self._owner != get_ident():
             with self.evaluating():
                 return self.entry(table, args, key)
@@ -142,14 +145,14 @@ class Database(Engine):
         return cast("V | None", node.value)
 
     def former(self, table: Callable[..., V], args: tuple[Hashable, ...]) -> V | None:
-        """The last answer of a query, current or not; None if there is none. Not noted as read: what is made of it must
-        mean the same without it."""
+        """The last answer of a query, current or not; None if there is none. It is not recorded as read, so the
+        caller's result must not depend on it."""
         query: Query = table.query  # type: ignore[attr-defined]
         memo = self._memos[query].get(args)
         return None if memo is None or memo.value is GONE else cast("V", memo.value)
 
     def _demand_unread(self, query: Query, args: tuple[Hashable, ...]) -> Memo:
-        """The memo of a query, up to date, without noting that it was read, unless it fails."""
+        """The memo of a query, up to date. It is recorded as read only if it fails."""
         frame, self._frame = self._frame, None
         try:
             return self._demand(query, args)
@@ -161,7 +164,7 @@ class Database(Engine):
             self._frame = frame
 
     def inputs_below(self, name: str, args: tuple[Hashable, ...]) -> tuple[Hashable, ...] | None:
-        """The keys of all inputs that the answer of the query `name` was found from; None if there is no answer now."""
+        """The keys of all inputs that the answer of the query `name` depends on; None if there is no current answer."""
         with self.evaluating():
             query = next((query for query in self._memos if query.name == name), None)
             memo = None if query is None else self._memos[query].get(args)
@@ -182,7 +185,7 @@ class Database(Engine):
 
     @contextmanager
     def evaluating(self) -> Iterator[None]:
-        """Hold the database: no other thread writes or evaluates. `cancel` holds for all of the block."""
+        """Hold the database, so that no other thread writes or evaluates. `cancel` applies to the whole block."""
         if self._owner == get_ident():
             yield
             return
@@ -193,7 +196,8 @@ class Database(Engine):
             self._release()
 
     def give_way(self) -> None:
-        """Raise `Cancelled` if this evaluation is to end: for long work between queries, which do so by themselves."""
+        """Raise `Cancelled` if this evaluation was cancelled. Queries check this themselves; call it in long work
+        between them."""
         if self._cancelled == self._evaluation:
             raise Cancelled
 
@@ -201,12 +205,12 @@ class Database(Engine):
 
     @property
     def events(self) -> list[Event]:
-        """What was recorded so far by the innermost `recording`."""
+        """What the innermost `recording` has recorded so far."""
         return self._events if self._events is not None else []
 
     @contextmanager
     def recording(self) -> Iterator[list[Event]]:
-        """Record events in the list that this gives."""
+        """Record events in the list that this yields."""
         before, logs, self._events, self._logs = self._events, self._logs, [], True
         try:
             yield self._events
@@ -218,14 +222,15 @@ class Database(Engine):
     def forget(
         self, predicate: Callable[[str, tuple[Hashable, ...]], bool], names: Container[str] | None = None
     ) -> int:
-        """Drop the memos whose query's name and arguments fulfil `predicate`; how many. Asked again, they run again.
+        """Drop the memos whose query name and arguments satisfy `predicate`. Returns how many. They run again when
+        asked for.
 
-        `names`: the queries that are looked at at all.
+        `names` limits the search to these queries.
         """
         return self._forget(lambda memo: predicate(memo.query.name, memo.args), names)
 
     def forget_unused(self, revisions: int, durability: int = 0) -> int:
-        """Drop the memos of at most this durability that nobody asked for in the last `revisions` revisions."""
+        """Drop the memos up to this durability that nobody has asked for in the last `revisions` revisions."""
         before = self.revision - revisions
         return self._forget(lambda memo: memo.verified_at < before and memo.durability <= durability)
 
@@ -236,13 +241,14 @@ class Database(Engine):
             return sum(drop(table, [memo for memo in table.values() if predicate(memo)]) for table in tables)
 
     def _evict(self) -> None:
-        """Bring the tables of queries that `keep` back to size. Only between evaluations: nothing is in use then.
+        """Shrink the tables of queries that declare `keep`. Runs only between evaluations, when no memo is in use.
 
-        The longest unused go first. A memo that reads no input is verified for ever, so whether it is used shows only
-        after it was set back to the present revision: it goes at the sweep after, if it is still there.
+        The least recently used memos go first. A memo that reads no input counts as verified forever, which hides
+        whether it is used; so it is set back to the present revision, and dropped at the next sweep if nobody asked for
+        it.
         """
         if len(self._arguments) > MOST_ARGUMENTS:
-            self._arguments.clear()  # they are only shared, and nobody looks there for anything
+            self._arguments.clear()  # this only makes equal tuples share memory
         for query, table in self._memos.items():
             if not query.keep or len(table) <= self._limits.get(query, query.keep):
                 continue

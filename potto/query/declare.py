@@ -1,4 +1,4 @@
-"""`query`: a function becomes a query."""
+"""`query` turns a function into a query."""
 
 from __future__ import annotations
 
@@ -31,10 +31,11 @@ def query(
 ) -> Any:
     """Declare a query `f(db, *hashable_args)`, called with positional arguments.
 
-    `cycle(db, *args)` gives its value when it is found in a cycle. `keep`: about how many memos are kept, for a query
-    whose arguments go out of use (texts); the longest unused go first, those of the present revision never.
-    `travels`: its answers can be pickled and are worth it, see `travel`. `cuts`: it stands at most edits of what it
-    reads, so that readers hang on it rather than on that; of others this shows when it has happened once.
+    `cycle(db, *args)` gives its value when it is part of a cycle. `keep`: roughly how many memos to keep, for
+    queries on texts that go out of use; the least recently used go first, never those of the present revision.
+    `travels`: its answers can be pickled and are worth sending, see `travel`. `cuts`: most edits of what it reads
+    leave its answer as it is, so readers depend on the answer and not on what lies below. Of other queries this is
+    noticed once it happens.
     """
     if function is None:
         return lambda f: _declare(Query(f, cycle, keep, travels, cuts))
@@ -44,7 +45,7 @@ def query(
 def _declare(declared: Query) -> Callable[..., Any]:
     @functools.wraps(declared.function)
     def call(db: Database, *args: Hashable) -> Any:
-        # What happens at a hit, all in one place: this is the hottest code of the front end.
+        # Everything that a hit needs, in one place: this is the hottest code of the front end.
         memo = db._memos[declared].get(args)
         if memo is not None and memo.verified_at >= db.revision:
             if db._owner == get_ident():
@@ -55,7 +56,7 @@ def _declare(declared: Query) -> Callable[..., Any]:
                     frame[memo] = None
                 return memo.value
             value = memo.value
-            if value is not GONE:  # else forgotten by another thread at this very moment
+            if value is not GONE:  # else another thread has just dropped it
                 return value
         return db._demand(declared, args).value
 

@@ -1,7 +1,7 @@
-"""Demanding, verifying and running queries, and the cycles that show on the way.
+"""Demanding, verifying and running queries, and the cycles met on the way.
 
-Verification is iterative. Running is recursive by nature; every `SEGMENT` levels it moves to a fresh thread, which owns
-the database while the old one waits, so that a chain of any length overflows no stack.
+Verification is iterative. Running is recursive by nature: every `SEGMENT` levels it moves to a new thread, which owns
+the database while the old one waits. So a chain of any length fits on the stack.
 """
 
 from __future__ import annotations
@@ -11,19 +11,19 @@ import os
 import sys
 import threading
 from collections import defaultdict
-from collections.abc import Callable, Container, Hashable
-from itertools import chain
+from collections.abc import Callable, Hashable
 from threading import get_ident
 from typing import Any, Final, Literal
 
+from potto.query.leaves import leaves_of
 from potto.query.nodes import (
     DURABILITIES,
     FOREVER,
     GONE,
+    Below,
     Cancelled,
     CycleError,
     Event,
-    Leaf,
     Memo,
     Node,
     Query,
@@ -31,22 +31,27 @@ from potto.query.nodes import (
 )
 
 STEPS: Final = 10
-LEAVES: Final = 512  # of a memo that are kept: to look at more takes as long as to walk
-LEAVES_FIRST: Final = 8  # that are run for this on the way to one memo, before it is left to the walk
-SEGMENT: Final = 40  # levels of running queries on one thread: at 20 frames a level still below the limit
+FEW: Final = 16
+RESTING: Final = 32  # revisions before `Below` is worked out again for leaves below which something changed
+LOGGED: Final = 16  # revisions for which the changes are kept
+LEAVES_FIRST: Final = 8  # that are run early on the way to one memo; after that it is walked
+ONCE: Final = Below((), -FOREVER)  # of a memo that was verified once: it may never be again
+SEGMENT: Final = 40  # levels of running queries on one thread: with 20 frames each, still below Python's limit
 
 
 class Engine:
-    """The memos of one world, and what keeps them right. See `Database` for what it offers."""
+    """The memos, and what keeps them right. See `Database` for its interface."""
 
     def __init__(self) -> None:
         self.revision = 1
         self._memos: defaultdict[Query, dict[tuple[Hashable, ...], Memo]] = defaultdict(dict)
-        self._arguments: dict[tuple[Hashable, ...], tuple[Hashable, ...]] = {}  # most stand in a dozen memos
-        self._last_changed = [1] * (DURABILITIES + 1)  # by durability; of what reads no input: never
+        self._arguments: dict[tuple[Hashable, ...], tuple[Hashable, ...]] = {}  # most are shared by a dozen memos
+        self._last_changed = [1] * (DURABILITIES + 1)  # by durability; what reads no input never changes
+        self.few = FEW  # leaves to check one by one; if there are more, check first whether anything below them changed
+        self._changes: dict[int, set[Node]] = {1: set()}  # what changed in each of the last revisions
         self._lock = threading.Lock()
         self._owner = 0  # the thread that evaluates or writes
-        self._evaluation, self._cancelled = 1, 0  # the number of the present evaluation and of the one to cancel
+        self._evaluation, self._cancelled = 1, 0  # the numbers of the present evaluation and of the one to cancel
         self._frame: dict[Node, None] | None = None  # what the running query has read
         self._running: list[Memo] = []
         self._provisional: list[Memo] = []  # finished members of a cycle whose first query still runs
@@ -55,8 +60,13 @@ class Engine:
         self._logs = self._print
 
     def cancel(self) -> None:
-        """Make the evaluation that runs now, if any, raise `Cancelled` at its next query."""
+        """Make the running evaluation, if any, raise `Cancelled` at its next query."""
         self._cancelled = self._evaluation
+
+    def _next_revision(self) -> None:
+        self.revision += 1
+        self._changes[self.revision] = set()
+        self._changes.pop(self.revision - LOGGED, None)
 
     def _acquire(self) -> None:
         self._lock.acquire()
@@ -65,7 +75,7 @@ class Engine:
 
     def _release(self) -> None:
         self._owner = 0
-        self._evaluation += 1  # a cancellation that comes too late is for nobody
+        self._evaluation += 1  # a cancellation that comes too late has no effect
         self._lock.release()
 
     def _log(self, kind: Literal["executed", "reused", "input"], name: str, args: tuple[Hashable, ...]) -> None:
@@ -77,7 +87,7 @@ class Engine:
     # Demanding and verifying
 
     def _demand(self, query: Query, args: tuple[Hashable, ...]) -> Memo:
-        """The memo of a query, up to date, noted as read by the running query."""
+        """The memo of a query, up to date, recorded as read by the running query."""
         if self._owner != get_ident():
             self._acquire()
             try:
@@ -102,7 +112,7 @@ class Engine:
         return memo
 
     def _refresh(self, root: Memo) -> None:
-        """Bring a memo up to date, its nodes first; without recursion."""
+        """Bring a memo up to date, starting with the nodes that it reads. Does not recurse."""
         stack, places, revision = [root], [0], self.revision
         while stack:
             memo = stack[-1]
@@ -119,7 +129,7 @@ class Engine:
                 must_run = below
             while must_run:
                 must_run = not self._run_again(memo, memo is root)
-                if must_run:  # it failed, or is no more: whoever read it must find out by running
+                if must_run:  # it failed or was dropped: its readers must run to find out
                     stack.pop()
                     places.pop()
                     memo = stack[-1]
@@ -127,10 +137,11 @@ class Engine:
             places.pop()
 
     def _verify(self, memo: Memo, places: list[int]) -> Memo | bool:
-        """Go on verifying a memo at `places[-1]`: True if it must run, False if it stands, or the node to do first.
+        """Continue verifying a memo from `places[-1]`: True if it must run, False if it stands, or the node to do
+        first.
 
-        In the order of reading: a node is looked at only if all that was read before it stands, for else the query
-        might not ask for it any more.
+        Nodes are checked in the order in which they were read. One is looked at only if all those before it stand;
+        otherwise the query might not read it any more.
         """
         revision, since, last_changed = self.revision, memo.verified_at, self._last_changed
         stands: bool | Memo = last_changed[memo.durability] <= since
@@ -149,7 +160,7 @@ class Engine:
                         source.verified_at = revision
                     elif source.index >= 0 or source.provisional:
                         return True
-                    elif self._stands(source, STEPS) is True:  # as most do: no need to go there and come back
+                    elif self._stands(source, STEPS) is True:  # the usual case: no need to go there and come back
                         source.verified_at = revision
                         if self._logs:
                             self._log("reused", source.query.name, source.args)
@@ -169,36 +180,63 @@ class Engine:
         return False
 
     def _stands(self, memo: Memo, steps: int) -> bool | Memo:
-        """Whether nothing that a memo hangs on has changed, which saves the walk through all that lies between.
+        """Whether nothing that a memo depends on has changed, found out without walking through everything in between.
 
-        What it hangs on may hang on something else in turn; beyond so many steps that is left to the walk. Instead of
-        False the one node that must run for this to be known, as it has cut edits off before and may do so again.
+        A leaf may have leaves of its own; after `steps` levels this gives up and leaves the rest to the walk. It may
+        also return a memo instead of False: run this one first, since it has absorbed changes before and may do so
+        again.
         """
         since, revision, leaves = memo.verified_at, self.revision, memo.leaves
         if leaves is None or not steps or memo.index >= 0 or memo.provisional or self._last_changed[1] > since:
             return False
+        found = memo.found
+        if found is not None and found.leaves is leaves and found.since == since > revision - LOGGED:
+            below = self._many_stand(memo, found, steps)
+            if below is not False:
+                return below
         for leaf in leaves:
             source = leaf.source
             if source is not None and source.verified_at < revision:
-                if source.verified_at < 0 or source is memo:
-                    return False
-                below = self._stands(source, steps - 1)
+                below = self._source_stands(source, memo, steps)
                 if below is not True:
-                    cuts = source.cuts or leaf is not source  # the entry of a table stands when the others do not
-                    return source if below is False and cuts and self._runs_alone(source) else below
-                source.verified_at = revision
-                if self._logs:
-                    self._log("reused", source.query.name, source.args)
+                    return below
             if leaf.changed_at > since:
                 return False
+        if len(leaves) > self.few and (found is None or found.since < revision - RESTING):
+            memo.found = ONCE if found is None else Below(leaves, revision)
+        return True
+
+    def _many_stand(self, memo: Memo, found: Below, steps: int) -> bool | Memo:
+        """Whether nothing at all has changed below many leaves. If something has, check them one by one."""
+        for source in found.sources:
+            if source.verified_at < self.revision:
+                stands = self._source_stands(source, memo, steps)
+                if stands is not True:
+                    return stands
+        for later in range(found.since + 1, self.revision + 1):
+            if not self._changes[later].isdisjoint(found.nodes):
+                return False
+        found.since = self.revision
+        return True
+
+    def _source_stands(self, source: Memo, memo: Memo, steps: int) -> bool | Memo:
+        """Whether the memo that a leaf belongs to stands. If so, it is now up to date."""
+        if source.verified_at < 0 or source is memo:
+            return False
+        below = self._stands(source, steps - 1)
+        if below is not True:
+            return source if below is False and self._runs_alone(source) else below
+        source.verified_at = self.revision
+        if self._logs:
+            self._log("reused", source.query.name, source.args)
         return True
 
     def _runs_alone(self, memo: Memo) -> bool:
-        """Whether a memo can run before what lies between it and who hangs on it."""
+        """Whether a memo can be run before the memos between it and its reader."""
         return memo.index < 0 and not memo.provisional and self._memos[memo.query].get(memo.args) is memo
 
     def _run_again(self, memo: Memo, asked: bool) -> bool:
-        """Run a memo that is found stale; False if that gave no value and it was not asked for by itself."""
+        """Run a stale memo. False if this gave no value and nobody asked for it directly."""
         table = self._memos[memo.query]
         if asked:
             table[memo.args] = memo
@@ -209,7 +247,7 @@ class Engine:
         try:
             self._run(memo)
         except Exception:
-            return False  # not swallowed: its reader runs next, asks for it again and meets the exception itself
+            return False  # not swallowed: its reader runs next and gets the same exception
         return memo.verified_at >= self.revision
 
     # Running
@@ -228,7 +266,7 @@ class Engine:
             self._log("executed", memo.query.name, memo.args)
         changed_at = memo.changed_at
         try:
-            memo.put(self._answer(memo), self.revision)
+            memo.put(self._answer(memo), self.revision, self._changes[self.revision])
             if not fresh and memo.changed_at == changed_at:
                 memo.cuts = True
             self._depend(memo, frame)
@@ -242,7 +280,9 @@ class Engine:
         if memo.low < index:
             memo.provisional, memo.verified_at = True, -1
             self._provisional.append(memo)
-            for member in self._provisional[mark:]:  # what hung on this one now hangs on what this one hangs on
+            for member in self._provisional[
+                mark:
+            ]:  # members that depended on this one now depend on what it depends on
                 member.low = min(member.low, memo.low)
         elif memo.cyclic:
             self._close_cycle(memo, mark)
@@ -263,7 +303,7 @@ class Engine:
         return value
 
     def _depend(self, memo: Memo, frame: dict[Node, None]) -> None:
-        """The memo stands as long as what it has read; what reads no input itself stands for ever."""
+        """Record what a memo depends on. One that reads no input stands forever."""
         durability = DURABILITIES
         for dep in frame:
             if dep.durability < durability:
@@ -274,14 +314,15 @@ class Engine:
         memo.verified_at = self.revision if durability < DURABILITIES else FOREVER
 
     def _fail(self, memo: Memo, frame: dict[Node, None], mark: int, fresh: bool, failed: bool) -> None:
-        """Leave no half-made answers. A cancelled memo stays as it was; a failed one will differ from what it was."""
+        """Leave no half-made answers. A cancelled memo stays as it was; a failed one counts as changed."""
         for member in self._provisional[mark:]:
             member.provisional = False
             drop(self._memos[member.query], [member])
             member.deps, member.verified_at = (), -1
         del self._provisional[mark:]
         if failed:
-            memo.put_error(self.revision, min((dep.durability for dep in frame), default=0))
+            durability = min((dep.durability for dep in frame), default=0)
+            memo.put_error(durability, self.revision, self._changes[self.revision])
         elif fresh:
             self._memos[memo.query].pop(memo.args, None)
 
@@ -315,7 +356,7 @@ class Engine:
     # Cycles
 
     def _meet_cycle(self, memo: Memo) -> None:
-        """The running query asks for one that runs, or for a finished member of a cycle that is still open."""
+        """The running query asks for one that is running, or for a finished member of a cycle that is still open."""
         low = memo.index if memo.index >= 0 else memo.low
         for above in self._running[low + 1 :]:
             above.low = min(above.low, low)
@@ -325,10 +366,10 @@ class Engine:
         if memo.query.fallback is None:
             path = " -> ".join(map(repr, [*self._running[low:], memo]))
             raise CycleError(f"a query needs its own answer: {path}")
-        memo.put(memo.query.fallback(self, *memo.args), self.revision)
+        memo.put(memo.query.fallback(self, *memo.args), self.revision, self._changes[self.revision])
 
     def _close_cycle(self, first: Memo, mark: int) -> None:
-        """All members of a cycle depend on all that any of them read outside it."""
+        """Make all members of a cycle depend on everything that any of them read outside it."""
         members = [*self._provisional[mark:], first]
         del self._provisional[mark:]
         inside = set(members)
@@ -338,43 +379,9 @@ class Engine:
             self._depend(member, outside)
 
 
-def leaves_of(deps: tuple[Node, ...]) -> tuple[Leaf, ...] | None:
-    """The undurable leaves below some nodes; None if there are more than `LEAVES`, or not all are known."""
-    widest: tuple[Leaf, ...] = ()
-    others: list[tuple[Leaf, ...]] = []
-    own: list[Leaf] = []
-    for dep in deps:
-        if dep.durability:
-            continue
-        if not isinstance(dep, Memo) or dep.cuts:
-            own.append(dep)
-        elif dep.leaves is None:
-            return None
-        elif dep.leaves is not widest:
-            others.append(dep.leaves)
-            if len(dep.leaves) > len(widest):
-                widest = dep.leaves
-    if len(others) <= 1 and all(dep in widest or _is_covered(dep, widest) for dep in own):
-        return widest
-    union = set(own).union(*others)
-    if len(union) > LEAVES:
-        return None
-    if len(union) == len(widest):
-        return widest  # most chains are straight: they share one
-    own = [dep for dep in own if not _is_covered(dep, union)]
-    return tuple(dict.fromkeys(chain(*others, own)))  # in the order of reading: in a set's they are verified at random
-
-
-def _is_covered(leaf: Leaf, others: Container[Leaf]) -> bool:
-    """Whether a memo that cuts edits off hangs on one of the others alone, which says all that it could say: if that
-    has not changed it has not either, and if that has there is no more to ask."""
-    if not isinstance(leaf, Memo) or leaf.leaves is None or len(leaf.leaves) != 1 or leaf.durability:
-        return False
-    return leaf.leaves[0] in others
-
-
 def drop(table: dict[tuple[Hashable, ...], Memo], memos: list[Memo]) -> int:
-    """Detach memos from their table and free their values. Their readers still verify through what they had read."""
+    """Remove memos from their table and free their values. Their readers can still be verified through what these had
+    read."""
     dropped = 0
     for memo in memos:
         if memo.index < 0 and not memo.provisional and table.pop(memo.args, None) is not None:

@@ -1,4 +1,4 @@
-"""What the database is made of: inputs, memos, entries of tables, events, and what can go wrong."""
+"""The parts of the database: inputs, memos, entries of tables and events; and what can go wrong."""
 
 from __future__ import annotations
 
@@ -8,23 +8,24 @@ from typing import Any, Final, Literal
 
 from potto.quick import quick, value
 
-DURABILITIES: Final = 3  # of inputs: 0, 1, 2; a memo that reads no input has this one
-FOREVER: Final = sys.maxsize  # the revision up to which such a memo is verified
-GONE: Final[Any] = object()  # the value of a memo that was forgotten, or that failed
+DURABILITIES: Final = 3  # of inputs: 0, 1, 2; this one is for memos that read no input
+FOREVER: Final = sys.maxsize  # the revision up to which such a memo counts as verified
+GONE: Final[Any] = object()  # the value of a memo that was dropped or that failed
+MOST_BELOW: Final = 1024  # most nodes that `Below` collects
 MISSING: Final[Any] = object()  # the value of an input that was never set
 
 
 class Cancelled(BaseException):
-    """The evaluation was cancelled. Not an `Exception`, so that no handler of errors holds it up."""
+    """The evaluation was cancelled. This is no `Exception`, so that handlers of errors let it through."""
 
 
 class CycleError(Exception):
-    """A query needs its own answer and has no fallback: an internal error that names the cycle."""
+    """A query needs its own answer and has no fallback. An internal error; its text shows the cycle."""
 
 
 @value
 class Event:
-    """What happened to a query (`reused`: verified after an edit, not run) or an input (`query` is then "input")."""
+    """What happened to a query or input (`query` is then "input"). `reused`: verified after an edit without a run."""
 
     kind: Literal["executed", "reused", "input"]
     query: str
@@ -33,27 +34,28 @@ class Event:
 
 @value
 class Parted:
-    """A table made of parts, for the answer of a query that runs at every edit: parts that it has in common with the
-    answer before are not looked at. `place` has the part that counts for each key."""
+    """A mapping made of parts, as the answer of a query that runs after every edit. Parts shared with the previous
+    answer are skipped when the two are compared. `place` says which part holds a key."""
 
     parts: tuple[Mapping[Any, Any], ...]
     place: Mapping[Any, int]
 
     def get(self, key: Any) -> Any:
-        """What is under a key, or None."""
+        """The value under a key, or None."""
         place = self.place.get(key)
         return None if place is None else self.parts[place][key]
 
     def may_differ(self, old: Parted) -> set[Any]:
-        """The keys under which it may have something else than another table."""
+        """The keys whose values may differ from those of another table."""
         here, there = set(map(id, self.parts)), set(map(id, old.parts))
         own = [part for part in self.parts if id(part) not in there]
         return {key for part in (*own, *(part for part in old.parts if id(part) not in here)) for key in part}
 
 
 class Query:
-    """A declared query: its function, name, fallback in a cycle, how many memos to keep (0: all), whether its answers
-    travel to other databases (see `travel`), and whether it `cuts`: stands at most edits of what it reads."""
+    """A declared query: its function and name, its fallback in a cycle, how many memos to `keep` (0: all), whether its
+    answers travel to other databases (see `travel`), and whether most edits below it leave its answer alone (`cuts`).
+    """
 
     __slots__ = ("cuts", "fallback", "function", "keep", "name", "travels")
 
@@ -65,7 +67,7 @@ class Query:
 
 
 class Input:
-    """A value from outside. `source` None: it needs no verification."""
+    """A value from outside. Its `source` is None, since it needs no verification."""
 
     __slots__ = ("changed_at", "durability", "source", "value")
 
@@ -77,11 +79,12 @@ class Input:
 class Memo:
     """The answer of a query for its arguments.
 
-    `index` is its place on the stack of running queries, or -1. `low` is the lowest place that it reaches by a cycle,
-    `leaves` are the undurable nodes that it hangs on in the end: inputs, entries of tables, and memos of which it was
-    seen, or is declared, that they cut edits off (`cuts`). As long as none of them and nothing durable changes, it
-    stands. None if they are too many to be worth it, or not known.
-    `cyclic` says that a cycle leads back to it, `provisional` that it has finished but its cycle has not.
+    `index` is its place on the stack of running queries, or -1. `low` is the lowest place that it reaches through a
+    cycle. `cyclic`: a cycle leads back to it. `provisional`: it has finished, but its cycle has not.
+
+    `leaves` are the nodes of durability 0 that it depends on in the end: inputs, entries of tables, and memos known or
+    declared to absorb most edits (`cuts`). The memo stands as long as no leaf and nothing durable changes. None if
+    there are too many, or if they are not known. `found` collects everything below many leaves, once it was needed.
     """
 
     __slots__ = (
@@ -92,6 +95,7 @@ class Memo:
         "deps",
         "durability",
         "entries",
+        "found",
         "index",
         "leaves",
         "low",
@@ -106,6 +110,7 @@ class Memo:
         self.query, self.args, self.value = query, args, GONE
         self.deps: tuple[Node, ...] = ()
         self.leaves: tuple[Leaf, ...] | None = None
+        self.found: Below | None = None
         self.cuts = query.cuts
         self.verified_at, self.changed_at, self.durability = -1, -1, 0
         self.entries: dict[Any, Entry] | None = None
@@ -115,11 +120,14 @@ class Memo:
     def __repr__(self) -> str:
         return f"{self.query.name}({', '.join(short(arg) for arg in self.args)})"
 
-    def put(self, value: Any, revision: int) -> None:
-        """Give it a value. An equal one is no change, and the old object stays."""
+    def put(self, value: Any, revision: int, changes: set[Node]) -> None:
+        """Set the value. If it is equal, nothing has changed and the old object stays. Whatever others may have read
+        before is added to `changes`."""
         if self.value is not GONE and same(self.value, value):
             return
         old, entries = self.value, self.entries or {}
+        if self.changed_at >= 0:
+            changes.add(self)
         self.value, self.changed_at = value, revision
         changed: Iterable[Any] = entries
         if isinstance(value, Parted) and isinstance(old, Parted):
@@ -128,17 +136,20 @@ class Memo:
             entry, new = entries[key], value.get(key)
             if not same(entry.value, new):
                 entry.value, entry.changed_at = new, revision
+                changes.add(entry)
 
-    def put_error(self, revision: int, durability: int) -> None:
-        """It failed: whatever comes next differs from what it was."""
+    def put_error(self, durability: int, revision: int, changes: set[Node]) -> None:
+        """The query failed: its next value counts as changed."""
         self.value, self.verified_at, self.changed_at = GONE, -1, revision
         self.deps, self.leaves, self.durability = (), None, durability
+        changes.add(self)
         for entry in (self.entries or {}).values():
             entry.value, entry.changed_at = GONE, revision
+            changes.add(entry)
 
 
 class Entry:
-    """One key of a query whose value is a mapping: changes only when the value under that key does."""
+    """One key of a query whose value is a mapping. It changes only when the value under that key does."""
 
     __slots__ = ("changed_at", "key", "source", "value")
 
@@ -150,8 +161,38 @@ class Entry:
         return self.source.durability
 
 
+class Below:
+    """Everything below some leaves.
+
+    `nodes` are the leaves and what they depend on in turn. `sources` are the memos among them that read inputs
+    themselves: once these are up to date, all changes among the nodes are known. Valid from the revision `since` on, as
+    long as none of the nodes changes.
+    """
+
+    __slots__ = ("leaves", "nodes", "since", "sources")
+
+    def __init__(self, leaves: tuple[Leaf, ...], since: int) -> None:
+        self.leaves, self.since = leaves, since
+        nodes: dict[Node, None] = dict.fromkeys(leaves)
+        sources: dict[Memo, None] = {}
+        seen = set[Memo]()
+        todo = list(leaves)
+        for leaf in todo:
+            source = leaf.source
+            if source is None or source in seen:
+                continue
+            seen.add(source)
+            below = source.leaves
+            if below is None or len(nodes) > MOST_BELOW or None in [node.source for node in below]:
+                sources[source] = None
+                continue
+            todo += [node for node in below if node not in nodes]
+            nodes.update(dict.fromkeys(below))
+        self.nodes, self.sources = frozenset(nodes), tuple(sources)
+
+
 def entry_of(memo: Memo, key: Any) -> Entry:
-    """One key of a memo whose value is a mapping."""
+    """The entry of a memo whose value is a mapping."""
     if memo.entries is None:
         memo.entries = {}
     node = memo.entries.get(key)
@@ -165,17 +206,17 @@ Leaf = Node
 
 
 def same(old: Any, new: Any) -> bool:
-    """Whether two values are equal, so that nothing changed."""
+    """Whether two values are equal, so that nothing has changed."""
     if old is new:
         return True
     try:
         return bool(old == new)
-    except RecursionError:  # values nested deeper than `==` can walk: to run a reader once more is always right
+    except RecursionError:  # nested too deeply for `==`; running the reader once more is always right
         return False
 
 
 def short(value: object) -> str:
-    """A value for a log."""
+    """A value, shortened for a log."""
     text = repr(value)
     return text if len(text) <= 60 else f"{text[:40]}...{text[-16:]}"
 

@@ -27,12 +27,12 @@ InputSent = tuple[Hashable, str]
 AnswerSent = tuple[int, Args, int, tuple[int, ...]]
 EntrySent = tuple[int, Hashable, None]
 Sent = InputSent | AnswerSent | EntrySent
-MOST_BELOW = 5_000_000  # memos on the way down: more than there are in any database
+MOST_BELOW = 5_000_000  # a limit on the walk down, beyond the size of any database
 
 
 @value
 class Parcel:
-    """The answer of number `root`, with the values and the nodes that were not sent before."""
+    """The answer with the number `root`, together with all values and nodes that were not sent before."""
 
     root: int
     values: tuple[Any, ...]
@@ -45,12 +45,12 @@ def digest(value: object) -> str:
 
 
 def address(query: Query) -> tuple[str, str]:
-    """Where a query is found: its module, and its name there."""
+    """Where a query is defined: its module and its name."""
     return query.function.__module__, query.function.__name__
 
 
 class Sender:
-    """Packs answers of a database. It holds for one revision: after an edit both ends begin anew."""
+    """Packs answers of a database. Valid for one revision: after an edit both ends start anew."""
 
     def __init__(self, db: Database) -> None:
         self._db = db
@@ -62,7 +62,7 @@ class Sender:
         self._new: list[Sent] = []
 
     def pack(self, query: Callable[..., Any], *args: Hashable) -> Parcel:
-        """The parcel of an answer; the query must travel. Raises what the query raises."""
+        """The parcel for an answer. The query must travel. Raises whatever the query raises."""
         with self._db.evaluating():
             root = self._db.memo(query, args)
             self._new_values, self._new = [], []
@@ -70,7 +70,7 @@ class Sender:
             return Parcel(self._views[root][0], tuple(self._new_values), tuple(self._new))
 
     def _look_at(self, root: Memo) -> None:
-        """See all that a memo rests on, what is below first; without recursion."""
+        """Visit everything that a memo depends on, from the bottom up, without recursion."""
         views, stack = self._views, [root]
         while stack:
             memo = stack[-1]
@@ -115,7 +115,7 @@ class Sender:
         return self._number(node, (self._keys[node], digest(node.value)))
 
     def _value(self, value: Any) -> int:
-        """The number of a value; equal ones are sent once, so that they are one object on the other side."""
+        """The number of a value. Equal values are sent once and are one object on the other side."""
         key: Any = (type(value), value)
         try:
             number = self._values.get(key)
@@ -141,9 +141,10 @@ class Receiver:
         self._same, self._other, self._revision = 0, 0, -1  # which inputs are the same here, in which revision
 
     def take(self, parcel: Parcel) -> bool:
-        """Take over what rests on nothing that is different here; whether that goes for the answer itself.
+        """Take over everything that depends on nothing that differs here. Returns whether this includes the answer
+        itself.
 
-        If it is cancelled, it goes on where it was when it is called with the same parcel again.
+        After a cancellation, call it again with the same parcel: it continues where it was.
         """
         with self._db.evaluating():
             if self._begun is None:
@@ -155,7 +156,7 @@ class Receiver:
                     node, reads = self._taken(sent)
                     self._reads.append(reads)
                     self._nodes.append(node)
-            except Exception:  # a query fails, and will so where it is asked for
+            except Exception:  # a query fails; whoever asks for it will see that
                 self._reads += [0] * (end - len(self._reads))
                 self._nodes += [None] * (end - len(self._nodes))
             self._begun = None
@@ -181,7 +182,7 @@ class Receiver:
         return self._db.adopt(getattr(import_module(module), name), sent[1], self._values[sent[2]], below), reads
 
     def _holds(self, reads: int) -> bool:
-        """Whether inputs are the same here."""
+        """Whether these inputs are the same here."""
         if self._revision != self._db.revision:
             self._same, self._other, self._revision = 0, 0, self._db.revision
         open_ = reads & ~self._same

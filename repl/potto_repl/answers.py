@@ -58,7 +58,7 @@ def entry_parts(session: Conversation, text: str) -> Iterator[Part]:
 
 
 def _is_elsewhere(session: Conversation, located: Located) -> bool:
-    """Whether a module defines the name that means nothing here, as the message then says."""
+    """Whether a module defines the name that means nothing here; the message then says so."""
     place, source = located.diagnostic.span, session.source(located.file) if located.file is not None else None
     if source is None or located.file is None:
         return False
@@ -66,7 +66,7 @@ def _is_elsewhere(session: Conversation, located: Located) -> bool:
 
 
 def _no_answer(session: Conversation, located: Located, name: str) -> Located:
-    """What is said of an answer that there never was, over the place where it is written: `Out[3]`, `_3` or `_`."""
+    """The message about an answer that never existed, at the place where it is written: `Out[3]`, `_3` or `_`."""
     found = located.diagnostic
     names = [o.names[-1] for e in session.entries for o in e.outcomes if isinstance(o, Valued) and o.names]
     listed = ", ".join(f"`{known}`" for known in names[-FEW:])

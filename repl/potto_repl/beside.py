@@ -1,6 +1,6 @@
-"""What goes on beside the prompt, on threads of its own: checking what is typed, and the line that shows progress.
+"""What goes on beside the prompt, on threads of its own: checking what is typed, and the progress line.
 
-Owns `Checker` and `Progress`. Neither ever keeps the person waiting: a check is cancelled when an entry is handed in.
+Owns `Checker` and `Progress`. Neither ever keeps the user waiting: a check is cancelled when an entry is handed in.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ Mark = tuple[int, int]
 
 
 class Checker:
-    """Checks the newest text that it was given, and keeps what is wrong with it."""
+    """Checks the newest text it was given, and keeps what is wrong with it."""
 
     def __init__(self, loader: Loader, done: Callable[[], None]) -> None:
         self.loader = loader
@@ -41,7 +41,7 @@ class Checker:
         return marks if known == text else ()
 
     def look(self, text: str) -> None:
-        """Check this text when there is time; whatever was to be checked before is not."""
+        """Check this text when there is time. A text that was waiting is dropped."""
         with self._wake:
             self._wanted = text
             self._wake.notify()
@@ -123,7 +123,7 @@ class Progress:
         self.say("")
 
     def note(self, text: str, share: float | None = None, *, open: bool = False) -> None:
-        """What is being done, and which share of it is over; open: of what is known so far, and more may come."""
+        """Note what is being done and how much of it is over. `open`: of what is known so far; there may be more."""
         self._text, self._share, self._open = text, share, open
 
     def say(self, text: str) -> None:
@@ -171,7 +171,7 @@ def _rest(spent: float, share: float) -> str:
 
 
 def duration(seconds: float) -> str:
-    """A time that somebody waits: `1.4 s`, `12 min`, `3.1 h`."""
+    """A waiting time: `1.4 s`, `12 min`, `3.1 h`."""
     if seconds < 100:
         return f"{seconds:.1f} s"
     return f"{seconds / 60:.0f} min" if seconds < 6000 else f"{seconds / 3600:.1f} h"

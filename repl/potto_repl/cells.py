@@ -17,7 +17,8 @@ _MISSED = "not converged"
 
 
 def placed(cell: str) -> Iterator[str]:
-    """The entries of a cell, below as many empty lines as stand above them: so messages name the lines of the cell."""
+    """The entries of a cell, after as many empty lines as stand above them, so that messages name the lines of the
+    cell."""
     lines = [line.rstrip() for line in cell.splitlines()]
     after = 0
     for text in entries(cell.splitlines()):

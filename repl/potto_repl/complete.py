@@ -1,7 +1,7 @@
-"""Completion: what can stand at the cursor, with its type and what it is for.
+"""Completion: what can stand at the cursor, with its type and purpose.
 
-Owns `candidates`: what a command takes is known here, names and words are those that `potto.ide` proposes to editors.
-Knows no terminal, and may be called from another thread than the one that evaluates.
+Owns `candidates`. The arguments of commands are known here; names and words are those that `potto.ide` proposes to
+editors. Knows no terminal, and may be called from another thread than the one that evaluates.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ PROGRAMS = (".po", ".diffeo")
 
 
 class Candidate(Struct, frozen=True):
-    """What could be inserted: it replaces `length` characters before the cursor."""
+    """What can be inserted in place of the `length` characters before the cursor."""
 
     text: str
     length: int
@@ -130,5 +130,5 @@ def _code(session: Conversation, text: str) -> Iterator[Candidate]:
 
 
 def _prose(markdown: str) -> str:
-    """Markdown without its blocks of code: they say the type once more."""
+    """Markdown without its blocks of code, which repeat the type."""
     return re.sub(r"```.*?```", "", markdown, flags=re.DOTALL)

@@ -1,7 +1,7 @@
 """What there is to say about a name: of a program, a builtin, a measure, a word of the language.
 
-Owns `documentation`. The texts are those of the editor's hover, as plain text; they are imported when they are asked
-for, so that the first answer does not wait for them.
+Owns `documentation`. The texts are the editor's hovers as plain text. They are imported when asked for, so that the
+first answer doesn't wait for them.
 """
 
 from __future__ import annotations
@@ -35,14 +35,14 @@ def documentation(db: Database, name: str, target: DefinitionTarget | None) -> s
 
 
 def documented() -> list[str]:
-    """The names that are explained without being defined."""
+    """The names that have an explanation without being defined."""
     from potto.ide.names.words import KEYWORDS, SPECIALS
 
     return [*PRIMITIVES, *MEASURES, *COMPOSITIONS, *KEYWORDS, *SPECIALS]
 
 
 def plain(markdown: str) -> str:
-    """Markdown as people read it on a terminal: code as it is, no marks."""
+    """Markdown for a terminal: code as it is, no markup."""
     lines = [line for line in markdown.splitlines() if not line.startswith("```")]
     text = re.sub(r"\*\*([^*]+)\*\*", r"\1", "\n".join(lines))
     return re.sub(r"(?<!`)`([^`]+)`(?!`)", r"\1", text).strip()

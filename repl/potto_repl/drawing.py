@@ -58,7 +58,7 @@ def braille(plot: Plot, width: int = 60, height: int = 12, *, unicode: bool = Tr
 
 
 def _dots(plot: Plot, curve: Curve, width: int, height: int) -> Iterator[tuple[int, int]]:
-    """The dots of a curve, and every third one of the edges of its error band where that is to be seen."""
+    """The dots of a curve, and every third dot of the edges of its error band if that is visible."""
 
     def placed(run: list[tuple[float, float]]) -> set[tuple[int, int]]:
         return line([(x * (width - 1), (1 - y) * (height - 1)) for x, y in run])
@@ -101,7 +101,8 @@ def half_blocks(image: Image, *, unicode: bool = True, color: bool = True) -> st
 
 
 def shrunk(image: Image, columns: int) -> Image:
-    """The image in at most so many columns: of the pixels that are too many, the ones in the middle of the others."""
+    """The image in at most so many columns. If there are too many pixels, the ones in the middle of the others are
+    taken."""
     width, height = image.size
     if width <= columns:
         return image
@@ -143,7 +144,7 @@ def protocol(environment: Mapping[str, str] = os.environ) -> Protocol:
 
 
 def inline(image: Image, how: Protocol, columns: int) -> str:
-    """The escape codes that show an image over so many columns."""
+    """The escape codes that show an image across so many columns."""
     if how == "kitty":
         data = base64.b64encode(image.png()).decode()
         pieces = [data[i : i + 4096] for i in range(0, len(data), 4096)]

@@ -16,10 +16,8 @@ _OPENS = re.compile(r"(?:[(\[{,=:+*/^?-]|\b(?:then|else|in|and|or))\s*$")
 
 
 def is_over(text: str) -> bool:
-    """Whether Enter at the end of the text hands it in: it is complete or wrong, and no block that could go on.
-
-    A block is over at an empty line, or when its last line is not indented.
-    """
+    """Whether Enter at the end of the text hands it in: the entry is complete or wrong, and no block can continue. A
+    block ends at an empty line, or when its last line is not indented."""
     stripped = text.strip()
     if not stripped or stripped.startswith(":") or re.fullmatch(r"\S+\?{1,2}", stripped):
         return True
@@ -41,13 +39,13 @@ def is_over(text: str) -> bool:
 
 
 def flush_left(text: str) -> str:
-    """An entry whose first line is indented, as one copies it from the middle of a page, moved to the first column."""
+    """An entry whose first line is indented, as when copied from the middle of a page, moved to the first column."""
     blanks = text[: len(text) - len(text.lstrip(" \t"))]
     return "\n".join(line.removeprefix(blanks) for line in text.split("\n")) if blanks else text
 
 
 def indentation(text: str) -> str:
-    """The blanks with which the line after a text begins."""
+    """The blanks at the beginning of the next line."""
     line = text.rpartition("\n")[2]
     own = re.match(r"[ \t]*", line)
     blanks = own[0] if own is not None else ""
@@ -74,7 +72,7 @@ def _opens_block(text: str, line: str) -> bool:
 
 
 def unprompted(text: str) -> str:
-    """A paste without the prompts, and without the answers, of a transcript; any other text as it is."""
+    """A paste without prompts and answers if it is a transcript; any other text as it is."""
     text = text.replace("\r\n", "\n").replace("\r", "\n")
     lines = text.split("\n")
     if not any(_PROMPT.match(line) for line in lines):
@@ -89,7 +87,7 @@ def unprompted(text: str) -> str:
 
 
 def untabbed(text: str) -> str:
-    """A text whose lines are indented by blanks alone: a screen shows no tabs, and they may not be mixed."""
+    """A text indented by blanks only: tabs don't show on a screen, and the two may not be mixed."""
     return "\n".join(_indented(line) for line in text.split("\n"))
 
 

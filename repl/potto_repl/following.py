@@ -1,7 +1,6 @@
 """Files that a session follows: what they bring, what is recompiled when they change, and why.
 
-Owns `bring` and `refreshed`. A file that is broken on disk goes on meaning what it meant before, and the reload
-says so.
+Owns `bring` and `refreshed`. A file that is broken on disk keeps its former meaning, and the reload says so.
 """
 
 from __future__ import annotations
@@ -38,7 +37,8 @@ def _program(path: str) -> str:
 
 
 def bring(session: Conversation, path: str) -> list[Part]:
-    """Load a file, or the main program of a folder, and say what it brought; one that was loaded before is read again.
+    """Load a file, or the main program of a folder, and say what it brought. A file that was loaded before is read
+    again.
 
     Raises Refusal for a folder without a main program.
     """
@@ -70,7 +70,7 @@ def bring(session: Conversation, path: str) -> list[Part]:
 
 
 def refreshed(session: Conversation, quiet: bool = False) -> list[Part]:
-    """Read again what changed on disk, keep old definitions where the new text is wrong, and say what was done."""
+    """Read again what changed on disk, and say what was done. Where the new text is wrong, old definitions stay."""
     start = time.perf_counter()
     before = _State.of(session)
     changed = session.world.refresh()
@@ -95,7 +95,7 @@ def refreshed(session: Conversation, quiet: bool = False) -> list[Part]:
 
 
 def _stamp(file: str) -> tuple[int, ...] | None:
-    """What changes when a file does; None where there is none."""
+    """Something that changes whenever a file does; None if there is no file."""
     try:
         found = os.stat(file)
     except OSError:

@@ -1,7 +1,7 @@
-"""The keyboard between two prompts: keys are kept for the next one, and not echoed into the answer.
+"""The keyboard between two prompts: keys are kept for the next one instead of being echoed into the answer.
 
-Owns `quiet_keys`, `loud_keys` and `kept_interrupts`. Ctrl-C stays an interrupt throughout. Without a terminal the first
-two do nothing.
+Owns `quiet_keys`, `loud_keys` and `kept_interrupts`. Ctrl-C remains an interrupt throughout. Without a terminal the
+first two do nothing.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _coming: list[threading.Timer] = []  # interrupts that come again
 
 @contextmanager
 def quiet_keys() -> Iterator[None]:
-    """Keep keys as they are typed: no echo, no lines, so that a Ctrl-D typed too early is not lost."""
+    """Keep keys as they are typed, without echo and line by line, so that an early Ctrl-D isn't lost."""
     saved = _attributes()
     if saved is None:
         yield
@@ -58,7 +58,7 @@ def loud_keys() -> Iterator[None]:
 
 @contextmanager
 def kept_interrupts() -> Iterator[None]:
-    """Let no Ctrl-C get lost or do harm: where nothing can be raised, or a module is half imported, it comes again."""
+    """Neither lose a Ctrl-C nor let it do harm: if it can't be raised, or a module is half imported, it comes again."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return

@@ -22,7 +22,7 @@ _DOUBT = re.compile(r"(?:±|\+/-|error at most) *(\([^)]*\)|[\d.e-]+)")
 
 
 class Recorded(Struct, frozen=True):
-    """An entry, the line where it stands, and what was answered; nothing where only the entry was kept."""
+    """An entry, its line, and its answer; no answer if only the entry was kept."""
 
     line: int
     text: str
@@ -56,7 +56,7 @@ def recorded(text: str) -> Iterator[Recorded]:
 
 
 def replayed(text: str) -> Iterator[tuple[Recorded, Difference | None]]:
-    """Each entry of a record, entered again in a new session, with what is different now."""
+    """Enter each entry of a record again in a new session, and give what is different now."""
     from potto_repl.respond import respond
     from potto_repl.session import Conversation
     from potto_repl.symbols import readable
@@ -70,7 +70,7 @@ def replayed(text: str) -> Iterator[tuple[Recorded, Difference | None]]:
 
 
 def same(before: str, now: str) -> bool:
-    """Whether two answers say the same, to the digits that hold."""
+    """Whether two answers agree, up to the digits that hold."""
     lines = [[line.rstrip() for line in text.splitlines() if not _MEASURED.fullmatch(line)] for text in (before, now)]
     return len(lines[0]) == len(lines[1]) and all(map(_same_line, *lines))
 
@@ -93,7 +93,7 @@ def _doubt(line: str) -> float | None:
 
 
 def _room(number: str, doubt: float | None) -> float:
-    """How far a number as it is written may be off: its error, and what rounding to the digits that hold takes off."""
+    """How far off a written number may be: its error, and rounding to the digits that hold."""
     unit = _unit(number)
     return unit if doubt is None else doubt + min(unit / 2, 10 * doubt)
 
@@ -103,7 +103,7 @@ def _words(line: str) -> list[str]:
 
 
 def _unit(number: str) -> float:
-    """One unit of the last digit of a number that is written with a point, and rounding; none of a whole number."""
+    """One unit of the last written digit after the point, for rounding; 0 for a whole number."""
     mantissa, _, exponent = number.partition("e")
     digits = len(mantissa.partition(".")[2])
     if not digits and not exponent:

@@ -39,9 +39,9 @@ RTOL = 1e-5  # of a picture: finer than any pixel
 
 
 class Axes(Struct, frozen=True):
-    """A function of the axes, and of what is fixed after them.
+    """A function of the axes and of whatever is fixed after them.
 
-    dual: its parameters are duals, and what is drawn is the derivative by the parameter `by`.
+    dual: its parameters are duals, and the derivative by the parameter `by` is drawn.
     """
 
     label: str
@@ -113,7 +113,7 @@ def free_names(session: Conversation, text: str) -> list[str]:
 
 
 class Spent(Struct):
-    """What a picture has cost so far, and the largest error in it."""
+    """What a picture has cost so far, and its largest error."""
 
     evaluations: int = 0
     error: float = 0.0

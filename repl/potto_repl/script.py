@@ -54,7 +54,8 @@ def run(
     session: Conversation, texts: Iterable[str], out: TextIO, err: TextIO, *, look: Look = PIPE, complain: Look = PIPE,
     as_json: bool = False, keep_going: bool = False, load: str | None = None,
 ) -> int:  # fmt: skip
-    """Answer entries one by one; the exit status. A file that is loaded first says only what is wrong with it."""
+    """Answer entries one by one and return the exit status. A file that is loaded first only reports what is wrong with
+    it."""
     status = 0
     loading = [] if load is None else [f":load {load}"]
     for number, text in enumerate(itertools.chain(loading, texts)):

@@ -86,20 +86,20 @@ class Conversation(Session):
                 self.undoing.pop()  # nothing means anything else now
 
     def wrong(self, text: str) -> list[Diagnostic]:
-        """The errors that an entry would have, without making it one."""
+        """The errors that an entry would have, without entering it."""
         self.put_aside(TYPING, text)
         return [located.diagnostic for located in self.world.diagnostics(TYPING)
                 if located.diagnostic.severity == "error" and located.file == TYPING]  # fmt: skip
 
     def put_aside(self, file: str, text: str) -> None:
-        """Let a pseudo file hold what is being typed, in the scope of the session, without making it an entry."""
+        """Keep what is being typed in a pseudo file, in the scope of the session, without entering it."""
         self._put(file, plain_names(text), self.prelude)
 
     def source(self, file: str) -> SourceText | None:
         return self.written.get(file) or super().source(file)
 
     def remember(self, label: str) -> None:
-        """Note what is in scope before something changes it."""
+        """Note what is in scope before it changes."""
         self.undoing.append(Before(label, self.prelude, tuple(self.loaded), len(self.entries)))
 
     def undo(self) -> str | None:

@@ -1,4 +1,4 @@
-"""The way to the first prompt, kept short: what shows it is imported now, what answers on another thread.
+"""The way to the first prompt, kept short: what shows it is imported at once, what answers on another thread.
 
 Owns `Loader` and `talk`. Importing the evaluator takes longer than showing a prompt, and nobody types that fast.
 """
@@ -23,7 +23,7 @@ WARM = "integral [0, 1] [x < 0.5] d(x)"
 
 
 class Loader:
-    """Makes the session on another thread; whoever needs it waits."""
+    """Makes the session on another thread. Whoever needs it waits."""
 
     def __init__(self, settings: Settings, unicode: bool = True) -> None:
         self._settings = settings
@@ -75,7 +75,7 @@ class Loader:
         if self._session is not None:
             if self.told is not None:
                 self.told()
-            self._session.evaluate(WARM)  # the first kernel, plan and rule cost more than all later ones
+            self._session.evaluate(WARM)  # the first kernel, plan and rule are the slowest
             from potto_repl import complete  # noqa: F401  (for the first Tab)
 
 

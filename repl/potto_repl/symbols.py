@@ -1,6 +1,6 @@
-r"""Symbols that are typed as `\theta` and a tab, and how answers use them.
+"""Symbols that are typed as `\\theta` and a tab, and how answers use them.
 
-Owns `SYMBOLS`, `expanded_before` and `pretty`. What is inserted is always something that Potto reads.
+Owns `SYMBOLS`, `expanded_before` and `pretty`. Everything that is inserted can be read by Potto.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ def pretty(text: str, unicode: bool) -> str:
 
 
 def ascii_only(text: str) -> str:
-    """The text for a screen that knows no Unicode; what has no other form is escaped."""
+    """The text for a screen without Unicode. What has no other form is escaped."""
     if text.isascii():
         return text
     replaced = "".join(_ASCII.get(char, char) for char in text)

@@ -38,7 +38,7 @@ WATCH = 0.3  # seconds between two looks at the files
 
 
 def history_path() -> Path:
-    """Where entries are kept between sessions: `POTTO_HISTORY`, or the user's folder for such things."""
+    """Where entries are kept between sessions: `POTTO_HISTORY`, or the user's folder for such files."""
     named = os.environ.get("POTTO_HISTORY")
     if named:
         return Path(named)
@@ -47,7 +47,7 @@ def history_path() -> Path:
 
 
 def open_history() -> History:
-    """The history of all sessions; of this one alone where it cannot be kept."""
+    """The history of all sessions; if it can't be kept, that of this session only."""
     path = history_path()
     if path.exists() and not path.is_file():
         return InMemoryHistory()
@@ -64,7 +64,7 @@ def open_history() -> History:
 
 
 class KeptHistory(FileHistory):
-    """A history in a file; where that cannot be read or written any more, of this session alone."""
+    """A history in a file. If that can't be read or written any more, it holds this session only."""
 
     def load_history_strings(self) -> list[str]:
         try:

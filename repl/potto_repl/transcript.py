@@ -21,7 +21,7 @@ _ANSWER = re.compile(r"_([0-9]*)$")
 
 
 def program(session: Conversation, folder: str) -> tuple[str, list[str]]:
-    """The text of a file in a folder that says what was entered, and what a reader of it should know."""
+    """The text of a file in a folder that contains what was entered, and anything its reader should know."""
     notes: list[str] = []
     lines: list[str] = []
     for file in session.loaded:
@@ -100,7 +100,7 @@ class _Writer:
                 yield from self._printed(chunk.text, statement, values)
 
     def _live(self, entry: Entry, text: str, value: Valued) -> str:
-        """An expression with what came out, as a definition too if its answer is used later."""
+        """An expression with its answer; also a definition if the answer is used later."""
         comments = [token for token in tokenize(text) if token.kind == "COMMENT"]
         lines = [token.text for token in comments if not text[: token.start].rpartition("\n")[2].strip()]
         for token in reversed(comments):
@@ -144,7 +144,7 @@ class _Writer:
 
 
 def _expected(value: Valued) -> str | None:
-    """The digits that hold, as `#=` takes them; None for what is not a number."""
+    """The digits that hold, as `#=` takes them; None if it is not a number."""
     if not value.estimates or "<" in value.text or "unknown" in value.text or "nan" in value.text:
         return None
     estimate = value.estimates[0]

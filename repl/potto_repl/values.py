@@ -39,7 +39,7 @@ class Parts(Struct, frozen=True):
 
 
 def tail(estimate: Estimate, settings: Settings) -> str:
-    """Method, evaluations and time; nothing where there was nothing to do."""
+    """Method, evaluations and time; nothing if there was nothing to do."""
     if not estimate.evals and estimate.seconds < 0.05:
         return ""
     words = [estimate.method]
@@ -51,7 +51,7 @@ def tail(estimate: Estimate, settings: Settings) -> str:
 
 
 def is_dual(world: World, file: str, expr: nodes.Expr) -> bool:
-    """Whether an expression gives a value with its derivative."""
+    """Whether an expression gives a value together with its derivative."""
     return gives_dual(elaborate_expression(world.db, file, expr).term, world.program.linker)
 
 
@@ -106,14 +106,14 @@ def _called(world: World, term: Term) -> Term | None:
 
 
 def _combined(whole: Any, part: Any, sampled: bool) -> Any:
-    """The error of the difference. Samples of two parts that were drawn apart: the squares of their errors add up."""
+    """The error of the difference. If the samples of the two parts are independent, squares of errors add up."""
     if isinstance(whole, tuple):
         return tuple(_combined(x, y, sampled) for x, y in zip(whole, part, strict=True))
     return math.sqrt(max(whole**2 - part**2, 0.0)) if sampled else whole + part
 
 
 def _difference(whole: Any, part: Any, error: Any, share: float) -> tuple[Any, Any]:
-    """What is left of the whole. What is nothing but rounding, or that share of its error, counts as nothing."""
+    """What remains of the whole. Mere rounding, or a small enough share of its error, counts as nothing."""
     if isinstance(whole, tuple):
         pairs = [_difference(w, p, e, share) for w, p, e in zip(whole, part, error, strict=True)]
         return tuple(p[0] for p in pairs), tuple(p[1] for p in pairs)

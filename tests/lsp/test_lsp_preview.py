@@ -145,7 +145,10 @@ def test_a_pass_is_cancelled_at_once_and_the_next_one_runs(server: Server, uri: 
     assert time.monotonic() - started < 10
 
 
-PIXEL = """def shade(x, y, r) [x^2 + y^2 < r^2]
+DISCS = """def disc(p, y, r) [r^2 > p^2 + y^2]
+"""
+PIXEL = """from discs import disc
+def shade(x, y, r) [x < 9]*disc(x, y, r)
 def pixel(px, py, r, t)
     integral ([px, px + 0.1], [py, py + 0.1])
         (shade(x, y, r) + 2*[x < t]) d(x, y)
@@ -156,15 +159,17 @@ def test_a_pixel_leads_to_the_conditions_behind_it(server: Server, uri: Uri) -> 
     """Of x^2 + y^2 < r^2 at (0.35, 0.4), the middle: 0.25 - 0.1225 - 0.16 = -0.0325 outside; over a pixel it changes by
     0.1*(2*0.35 + 2*0.4) = 0.15, so it is 0.2167 pixels off. Of x < t: t - 0.35 = 0.25, which is 2.5 pixels."""
     client = server()
+    client.open(uri("discs"), DISCS)
     client.open(uri("main"), PIXEL)
     values = {"px": 0.3, "py": 0.35, "r": 0.5, "t": 0.6}
     asked = {"textDocument": {"uri": uri("main")}, "name": "pixel", "values": values, "cell": {"px": 0.1, "py": 0.1}}
     found = client.answer(client.begin("potto/pixel", asked), 60)["result"]
-    assert found["range"]["start"] == {"line": 1, "character": 0} and found["range"]["end"]["line"] == 3
-    circle, line = found["conditions"]
+    assert found["range"]["start"] == {"line": 2, "character": 0} and found["range"]["end"]["line"] == 4
+    circle, line, edge = found["conditions"]
     assert (circle["side"], line["side"]) == (-1, 1)
     assert math.isclose(circle["pixels"], 0.0325 / 0.15, rel_tol=1e-9)
     assert math.isclose(line["pixels"], 2.5, rel_tol=1e-9)
-    assert circle["range"]["start"] == {"line": 3, "character": 9}, "the call that leads to it"
-    assert line["range"]["start"]["line"] == 3 and "x = t" in line["equation"]
+    where = [(found["uri"], *found["range"]["start"].values()) for found in (circle, line, edge)]
+    assert where == [(uri("discs"), 0, 19), (uri("main"), 4, 29), (uri("main"), 1, 20)], "each where it is written"
+    assert "x = t" in line["equation"]
     assert client.error("potto/pixel", {**asked, "cell": {"qx": 1}}) == -32602

@@ -83,10 +83,12 @@ BODY_EDITS = [
 ]
 OF_TEXTS = {
     "parsed", "head", "chunk_references", "occurring_names", "piece", "_piece_diagnostics", "occurring_in_piece",
+    "_group", "_group_diagnostics",
 }  # fmt: skip
 OF_FILES = {
-    "content", "source", "pieces", "chunks", "layout", "outline", "texts", "syntax_diagnostics", "module_diagnostics",
-    "statements", "used_imports", "unused_imports", "_words_at", "exists", "problem", "diagnostics",
+    "content", "source", "pieces", "groups_of_pieces", "chunks", "layout", "outline", "texts", "syntax_diagnostics",
+    "module_diagnostics", "statements", "used_imports", "unused_imports", "_words_at", "exists", "problem",
+    "diagnostics",
 }  # fmt: skip
 
 

@@ -8,6 +8,7 @@ from typing import Any
 import mpmath as mp
 import numpy as np
 import pytest
+from exact_curves import CURVES
 from exact_fields import ARROW, SITES, WAVES, balls, bright, clipped, gained, shoelace, two_bands
 from scipy.optimize import brentq
 from worlds_references import agrees, dual, program, reference
@@ -118,6 +119,14 @@ def test_clouds() -> None:
     value, slope = dual(NOISE, "clouds", 0.1)
     assert abs(value - covered(0.1)) < 2e-5
     assert abs(slope - (covered(0.11) - covered(0.09)) / 0.02) < 2e-3
+
+
+@pytest.mark.slow
+def test_clouds_where_a_wave_meets_a_bound_but_for_rounding() -> None:
+    """With the other variable innermost the slope has its digits, and a sliver there, which is counted, spoils none."""
+    found = potto.deriv(NOISE.clouds)((-0.32, 1.0))
+    (_, slope), _ = CURVES["fields", "noise", "clouds"](-0.32)
+    assert abs(found.tangent - slope) <= found.tangent_error < 1e-9
 
 
 def moved(places: list[tuple[float, float]], which: int, axis: int, t: Any) -> list[tuple[Any, Any]]:

@@ -1,8 +1,8 @@
-"""The table of features: which method is answered by which adapter, and how the client hears of it.
+"""The table of features: which adapter answers which method, and what the client is told of it.
 
-Owns `FEATURES` and `capabilities`. An adapter is a function from an `Ask` to what is sent; its module is loaded when it
-is first asked, so that the greeting waits for none of them. `pace` says for what a question waits, see `work`: `slow`
-is what looks through a whole file or the whole workspace.
+Owns `FEATURES` and `capabilities`. An adapter is a function from an `Ask` to what is sent. Its module is loaded when it
+is first needed, so that the greeting waits for none. `pace` says what a question waits for, see `work`: `slow` is for
+those that look through a whole file or the workspace.
 """
 
 from __future__ import annotations
@@ -138,7 +138,7 @@ _FILES = {"filters": [{"scheme": "file", "pattern": {"glob": "**/*.{po,diffeo}"}
 
 
 def capabilities(encoding: str) -> dict[str, Any]:
-    """What the server can do, as the greeting says it."""
+    """What the server can do, as it says in its greeting."""
     found: dict[str, Any] = {
         "positionEncoding": encoding,
         "textDocumentSync": {"openClose": True, "change": 2, "save": {"includeText": False}},

@@ -27,7 +27,7 @@ def code_actions(ask: Ask) -> list[protocol.CodeAction]:
 
 
 def _expecting(ask: Ask, wanted: list[str]) -> Iterator[ide.CodeAction]:
-    """For a live expression whose value is known: to expect that, where it is not what is expected now."""
+    """For a live expression whose value is known: expect that value, if it isn't expected already."""
     if "#>" not in ask.text.text or (wanted and "quickfix" not in wanted):
         return
     span = ask.span
@@ -62,7 +62,7 @@ def _add_change(ask: Ask, found: protocol.CodeAction, action: ide.CodeAction, ur
         return
     found["edit"] = convert.workspace_edit(ask.analysis, ask.client, action.change)
     if action.rename_at is not None and ask.client.lists("experimental.commands.commands", "potto.rename"):
-        # Where the word will be once the change is made: only the client can say what that is in its terms.
+        # The place of the word after the change; only the client can convert it into its own terms.
         found["command"] = {"title": "rename", "command": "potto.rename", "arguments": [uri, action.rename_at]}
 
 

@@ -48,7 +48,7 @@ def _ranges(ask: Ask, caller: str, call: ide.Call) -> list[protocol.Range]:
 
 
 def _asked(ask: Ask) -> tuple[str, str]:
-    """The file and the name that an item of ours has in its `data`."""
+    """The file and the name in the `data` of one of our items."""
     data = ask.optional("item", "data")
     if not isinstance(data, list) or len(data) != 2 or not all(isinstance(part, str) for part in data):
         raise InvalidParams("`item.data` is not as it was given")

@@ -1,4 +1,4 @@
-"""`textDocument/semanticTokens`: whole, by what changed, and in a range."""
+"""`textDocument/semanticTokens`: all of them, what changed, and those in a range."""
 
 from __future__ import annotations
 
@@ -26,15 +26,15 @@ _ids = itertools.count(1)
 
 
 class Colours(Struct, frozen=True):
-    """The colours of a file: those of its pieces, and how many lines below the last word of the piece before each
-    begins."""
+    """The colours of a file: those of its pieces, and how many lines each piece begins below the last word of the one
+    before."""
 
     id: str
     parts: list[Numbers]
     below: list[int]
 
     def data(self, first: int, last: int) -> list[int]:
-        """The numbers of some pieces. Each word says where it stands by the word before, so those of a piece are the
+        """The numbers of some pieces. Each word is placed relative to the one before, so the numbers of a piece are the
         same wherever it stands, but for the first."""
         found: list[int] = []
         for (_, numbers), below in zip(self.parts[first:last], self.below[first:last]):
@@ -49,7 +49,7 @@ def full(ask: Ask) -> dict[str, Any]:
 
 
 def delta(ask: Ask) -> dict[str, Any]:
-    """What changed since the answer that the client has; all of it if we do not know that one any more."""
+    """What changed since the client's last answer; everything if that one is not known any more."""
     old = ask.session.tokens.get(ask.file)
     if old is None or old.id != ask.optional("previousResultId"):
         return full(ask)
@@ -58,8 +58,8 @@ def delta(ask: Ask) -> dict[str, Any]:
 
 
 def edits(old: Colours, new: Colours) -> list[dict[str, Any]]:
-    """One edit that makes `new` of `old`: all between what they begin and end with in common. Most of that are pieces,
-    which are told to be the same without being looked at."""
+    """One edit that turns `old` into `new`: everything between their common beginning and end. Most of these are pieces
+    that are the same objects, so their numbers are not compared."""
     least, head, tail = min(len(old.parts), len(new.parts)), 0, 0
     while head < least and _same(old, head, new, head):
         head += 1
@@ -81,12 +81,12 @@ def _same(old: Colours, mine: int, new: Colours, other: int) -> bool:
 
 
 def _in_common(old: list[int], new: list[int], most: int) -> int:
-    """How much two lists begin with in common, at most so much."""
+    """The length of the common beginning of two lists, up to `most`."""
     return next((place for place in range(most) if old[place] != new[place]), most)
 
 
 def _remember(ask: Ask) -> Colours:
-    """The colours of a file, from what is kept for each of its pieces."""
+    """The colours of a file, put together from those of its pieces."""
     parts: list[Numbers] = []
     below: list[int] = []
     before, encoding = 0, ask.text.encoding
@@ -130,7 +130,7 @@ def _of_piece(db: Database, file: str, text: str, hidden: tuple[str, ...], encod
 
 @query
 def _of_definition(db: Database, file: str, name: str, encoding: Encoding) -> Numbers:
-    """A definition's words as numbers, as if it stood at the head of its file."""
+    """The words of a definition as numbers, as if it stood at the beginning of its file."""
     return _numbers(Text(chunk_text(db, file, name) or "", encoding), definition_words(db, file, name))
 
 
@@ -141,7 +141,7 @@ def _of_the_rest(db: Database, file: str, text: str, encoding: Encoding) -> Numb
 
 
 def _numbers(text: Text, words: Iterable[Word], start: int = 0) -> Numbers:
-    """Words that stand from `start` of a text on as numbers."""
+    """Words as numbers, counted from `start` of a text."""
     found: list[int] = []
     before_line = before_column = 0
     for first, last, type, modifiers in words:

@@ -37,7 +37,7 @@ def execute(ask: Ask) -> Any:
 
 
 def _evaluate(ask: Ask, file: str, arguments: list[Any]) -> Deferred:
-    """An expression; a function by its name alone is evaluated at its point."""
+    """Evaluate an expression. A function's name alone stands for a call at its first point."""
     if not arguments:
         return _shown(ask, os.path.basename(file), task(ask, "run", file, ""))
     text = _text(arguments)
@@ -46,7 +46,7 @@ def _evaluate(ask: Ask, file: str, arguments: list[Any]) -> Deferred:
 
 
 def _point_of_name(ask: Ask, file: str, text: str) -> ide.Point | None:
-    """Where a function is looked at, if the text is its name."""
+    """The point at which a function is looked at, if the text is its name."""
     if text not in names(ask.db, file) or ide.kind_of(ask.db, file, text) != "function":
         return None
     for point in ide.points(ask.db, file, text):
@@ -55,7 +55,7 @@ def _point_of_name(ask: Ask, file: str, text: str) -> ide.Point | None:
 
 
 def _differentiate(ask: Ask, file: str, arguments: list[Any]) -> Any:
-    """Of a name the derivative in symbols, which needs no numbers and no other process; of a call the slopes there."""
+    """For a name the derivative in symbols, which needs neither numbers nor another process; for a call the slopes."""
     from potto.checking.facts import derivative_facts
 
     text = _text(arguments)
@@ -78,7 +78,7 @@ def _differentiate(ask: Ask, file: str, arguments: list[Any]) -> Any:
 
 
 def _slopes(point: ide.Point) -> Callable[[Result], Result]:
-    """The value at a point and the slopes there as lines to be read."""
+    """The value at a point and the slopes there, as lines to read."""
 
     def with_text(found: Result) -> Result:
         lines = [f"{point.text} = {found['shown']}"]
@@ -106,7 +106,7 @@ def _preview(ask: Ask, file: str, arguments: list[Any]) -> Deferred:
 
 
 def _more(ask: Ask, file: str, arguments: list[Any]) -> Any:
-    """What can be done with a definition. A client that has no such command of its own is shown a choice of it."""
+    """What can be done with a definition. A client without such a command of its own is shown a choice."""
     name = _text(arguments)
     found = list(offers(ask, file, name))
     if not found:
@@ -117,7 +117,7 @@ def _more(ask: Ask, file: str, arguments: list[Any]) -> Any:
 
 
 def _choose(ask: Ask, name: str, offers: list[protocol.Command]) -> None:
-    """Let the user choose from some commands, and do what was chosen."""
+    """Let the user choose one of some commands, and carry it out."""
 
     def chosen(answer: Any, error: Any) -> None:
         title = answer.get("title") if isinstance(answer, Mapping) else None
@@ -153,7 +153,8 @@ def task(
     shape: Callable[[Result], Result] = lambda result: result,
     quiet: bool = False,
 ) -> Deferred:
-    """What the evaluation process answers, when it does; `shape` makes the answer of it. `quiet`: without progress."""
+    """What the evaluation process answers, once it does. `shape` turns that into the answer of the request. `quiet`:
+    without progress."""
     waiting: list[tuple[Task, Working | None]] = []
 
     def start(finish: Callable[[Any | RequestError], None]) -> None:

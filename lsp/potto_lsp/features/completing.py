@@ -32,12 +32,12 @@ def complete(ask: Ask) -> protocol.CompletionList:
 
 
 def _with_import(ask: Ask, item: ide.Completion) -> ide.Completion:
-    """For a client that takes no edits later: the import that goes with a name."""
+    """For a client that cannot take edits later: include the import that a name needs."""
     return replace(item, edits=ide.resolve_completion(ask.db, item).edits) if item.data[:1] == ("import",) else item
 
 
 def _plain(item: ide.Completion) -> ide.Completion:
-    """For a client that knows no snippets: the word alone."""
+    """For a client without snippets: the word alone."""
     return replace(item, snippet=False, insert=item.label) if item.snippet else item
 
 

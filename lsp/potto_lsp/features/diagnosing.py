@@ -13,14 +13,14 @@ from potto_lsp.uris import to_key
 
 
 def document(ask: Ask) -> dict[str, Any]:
-    """What is wrong with a program. A project file is not a program: what is wrong with it is pushed."""
+    """What is wrong with a program. A project file is not one: what is wrong with it is pushed."""
     if os.path.basename(ask.file) == PROJECT:
         return {"kind": "full", "items": []}
     return ask.session.publisher.answer(ask.file, ask.optional("previousResultId"))
 
 
 def workspace(ask: Ask) -> dict[str, Any]:
-    """All programs. What did not change is `unchanged`; what the client knows of and is gone is empty."""
+    """The diagnostics of all programs: `unchanged` for those that did not change, and empty for those that are gone."""
     known = ask.optional("previousResultIds")
     ids = {
         to_key(str(item.get("uri"))): item.get("value")

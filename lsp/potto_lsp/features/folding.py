@@ -39,7 +39,7 @@ def selection_ranges(ask: Ask) -> list[protocol.SelectionRange]:
 
 
 def _nested(ask: Ask, offset: int) -> protocol.SelectionRange:
-    """The ranges around an offset, from the widest to the narrowest, which is what is sent."""
+    """The ranges around an offset as they are sent: from the narrowest to the widest, each with its parent."""
     spans = sorted({*ide.selection_ranges(ask.db, ask.file, offset)}, key=len, reverse=True)
     found: protocol.SelectionRange | None = None
     for span in spans or [Span(offset, offset)]:

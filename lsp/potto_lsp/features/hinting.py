@@ -20,7 +20,7 @@ SETTINGS = {"type": "hints.types", "parameter": "hints.coordinates"}
 
 
 def inlay_hints(ask: Ask) -> Encoded:
-    span, text, found = ask.span, ask.text, list[str]()
+    span, text, found = ask.span, ask.text, list[bytes]()
     off = frozenset(kind for kind, setting in SETTINGS.items() if ask.analysis.settings.get(setting) is False)
     for at, line in lined(ask):
         if span.start <= at.start and at.start + len(at.text) <= span.end:
@@ -30,7 +30,7 @@ def inlay_hints(ask: Ask) -> Encoded:
             near = [hint for hint in hints if span.start <= at.start + hint.offset <= span.end and hint.kind not in off]
             found.append(part_of(_hint(Text(at.text, text.encoding), hint) for hint in near).placed(line))
     found.append(part_of(_live(ask, span)).placed(0))
-    return Encoded(f"[{','.join([each for each in found if each])}]")
+    return Encoded(found)
 
 
 @query(keep=1024)
@@ -58,7 +58,7 @@ def _hint(text: Text, hint: ide.InlayHint) -> protocol.InlayHint:
 
 
 def _live(ask: Ask, span: Span) -> list[protocol.InlayHint]:
-    """The values that are known, behind their expressions."""
+    """The known values, behind their expressions."""
     found: list[protocol.InlayHint] = []
     for live, value in ask.session.live.values(ask.file):
         if value is not None and span.start <= live.span.end <= span.end:

@@ -1,4 +1,4 @@
-"""`textDocument/hover`: what is known by symbols, and the values where live expressions give some."""
+"""`textDocument/hover`: what is known in symbols, and values where live expressions give some."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def _values(ask: Ask, offset: int) -> str:
 
 
 def _live(ask: Ask, offset: int) -> protocol.Hover | None:
-    """A live expression: its value, with what it is off by."""
+    """A live expression: its value and its error."""
     if "#>" not in ask.text.text:
         return None
     if all(not live.span.start <= offset <= live.span.end for live in ide.live_in(ask.db, ask.file)):

@@ -22,37 +22,37 @@ COMMANDS = {
     "differentiate": "potto.differentiate", "showDerivative": "potto.differentiate",
 }  # fmt: skip
 SETTINGS = {"value": "lenses.value", "more": "lenses.more", "run": "lenses.run"}
-REFERENCES = "potto.showReferences"  # of the client; only one that says that it has it is given it
-LONG = 40  # characters of a value beyond which a lens does not show it
+REFERENCES = "potto.showReferences"  # a command of the client; used only if the client says that it has it
+LONG = 40  # characters; a lens shows no longer value
 
 
 def code_lenses(ask: Ask) -> Encoded:
-    """The lenses of a file, but for the kinds that are turned off."""
+    """The lenses of a file, except for kinds that are turned off."""
     off = {kind for kind, setting in SETTINGS.items() if ask.analysis.settings.get(setting) is False}
-    found, encoding = list[str](), ask.text.encoding
+    found, encoding = list[bytes](), ask.text.encoding
     for at, line in lined(ask):
-        part = _part(ask.db, ask.file, at.text, at.hidden, encoding, ask.uri, frozenset(off))
+        part, runs = _part(ask.db, ask.file, at.text, at.hidden, encoding, ask.uri, frozenset(off))
         found.append(part.placed(line))
-        if "run" not in off and any(
-            lens.command == "run" for lens in piece_lenses(ask.db, ask.file, at.text, at.hidden)
-        ):
+        if runs:  # a script is run once
             off.add("run")
-    return Encoded(f"[{','.join([text for text in found if text])}]")
+    return Encoded(found)
 
 
 @query(keep=1024)
 def _part(
     db: Database, file: str, text: str, hidden: tuple[str, ...], encoding: Encoding, uri: str, off: frozenset[str]
-) -> Part:
-    """The lenses of a piece. Of values the titles are found when they are shown."""
-    place = Text(text, encoding)
-    return part_of(
+) -> tuple[Part, bool]:
+    """The lenses of a piece, and whether one of them runs the script. The titles of values are looked up when they are
+    shown."""
+    place, lenses = Text(text, encoding), piece_lenses(db, file, text, hidden)
+    part = part_of(
         {"range": convert.range_of(place, lens.span), "data": [lens.command, *lens.arguments]}
         if lens.command == "value"
         else {"range": convert.range_of(place, lens.span), "command": _command(lens, uri)}
-        for lens in piece_lenses(db, file, text, hidden)
+        for lens in lenses
         if lens.command not in off
     )
+    return part, any(lens.command == "run" for lens in lenses)
 
 
 def resolve(ask: Ask) -> Any:
@@ -89,8 +89,8 @@ def offers(ask: Ask, file: str, name: str) -> Iterator[protocol.Command]:
 
 
 def _has_picture(ask: Ask, scene: ide.Scene | None) -> bool:
-    """A function of one or two numbers has a picture, also beside functions that are known; a client that draws for
-    itself shows what has more, too."""
+    """Whether a function can be drawn: one of one or two numbers, also with functions that are known. A client that
+    draws by itself can show others, too."""
     if scene is None:
         return False
     numbers = [p for p in scene.parameters if p.kind == "number"]

@@ -1,6 +1,6 @@
-"""`potto/scenes`, `potto/sample` and `potto/pixel`: what a preview may show, its numbers, and the code behind a place.
+"""`potto/scenes`, `potto/sample` and `potto/pixel`: what a preview may show, its numbers, and the code behind a pixel.
 
-Beyond the protocol: a client that draws for itself asks for numbers, others for the picture of `potto.preview`.
+Beyond the protocol: clients that draw by themselves ask for numbers, others for the picture of `potto.preview`.
 """
 
 from __future__ import annotations
@@ -9,9 +9,10 @@ from collections.abc import Mapping
 from typing import Any
 
 from potto import ide
-from potto.ide.display.pixels import pixel_conditions
+from potto.ide.display.pixels import PixelCondition, pixel_conditions
 from potto.modules import chunk_start, chunk_text
 from potto.source import Span
+from potto_lsp import convert, protocol
 from potto_lsp.asking import Ask
 from potto_lsp.deferred import Deferred
 from potto_lsp.errors import InvalidParams
@@ -56,11 +57,11 @@ def sample(ask: Ask) -> Deferred:
     if not isinstance(rtol, int | float | None) or (rtol is not None and not 0 < rtol < 1):
         raise InvalidParams("`rtol` is between 0 and 1")
     more = {"axes": axes, "values": values or {}, "wrt": wrt, "rtol": rtol}
-    return task(ask, "sample", ask.file, name, more, quiet=True)  # what is drawn shows how far it is
+    return task(ask, "sample", ask.file, name, more, quiet=True)  # the picture itself shows the progress
 
 
 def pixel(ask: Ask) -> Deferred:
-    """Where in the program a place of a picture comes from: the definition's conditions there, the nearest first."""
+    """The code behind a pixel: the conditions of the function that is drawn, the nearest first."""
     name, values, cell = ask.string("name"), ask.get("values"), ask.get("cell")
     if not isinstance(values, Mapping) or not isinstance(cell, Mapping) or not all(map(_is_number, cell.values())):
         raise InvalidParams("`values` is an object, and `cell` the sides of a pixel by the names of its axes")
@@ -70,7 +71,7 @@ def pixel(ask: Ask) -> Deferred:
     start = chunk_start(ask.db, ask.file, name)
     chunk = chunk_text(ask.db, ask.file, name) or ""
     whole = ask.range(Span(start, start + len(chunk.rstrip())))
-    written = [{"equation": each.equation, "range": ask.range(each.span.shift(start))} for each in found]
+    written = [{"equation": each.equation, **_written(ask, each)} for each in found]
     surfaces = [{"text": each.text, "parameters": list(each.parameters)} for each in found]
 
     def placed(result: Mapping[str, Any]) -> dict[str, Any]:
@@ -79,6 +80,11 @@ def pixel(ask: Ask) -> Deferred:
 
     more = {"surfaces": surfaces, "values": values, "cell": cell}
     return task(ask, "pixel", ask.file, name, more, placed, quiet=True)
+
+
+def _written(ask: Ask, found: PixelCondition) -> protocol.Location:
+    """Where a condition is written."""
+    return convert.location(ask.analysis, found.file, found.span.shift(chunk_start(ask.db, found.file, found.name)))
 
 
 def _is_number(value: Any) -> bool:

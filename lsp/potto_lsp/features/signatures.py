@@ -38,7 +38,7 @@ def _signature(ask: Ask, signature: ide.Signature) -> protocol.SignatureInformat
 
 
 def _parameter(ask: Ask, label: str, parameter: ide.ParameterText) -> protocol.ParameterInformation:
-    """The offsets in a label count UTF-16, whatever was negotiated."""
+    """A parameter. Offsets in a label count UTF-16 units, whatever was negotiated."""
     found: protocol.ParameterInformation = {"label": _columns(label, parameter.span)}
     if parameter.documentation:
         found["documentation"] = convert.markup(ask.client, FORMATS, parameter.documentation)

@@ -1,6 +1,6 @@
 """`potto/viewPage`, `potto/viewed` and `potto/view`: the integral view in an editor.
 
-Beyond the protocol: its page, what it shows of the place where the cursor is, and what answers it.
+Beyond the protocol: the page, what it shows for the place of the cursor, and the answers to its questions.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from potto_lsp.features.commands import task
 
 
 def page(ask: Ask) -> dict[str, str]:
-    """The page's body, style and script: a client puts them into a page of its own."""
+    """The page's body, style and script, for a client to put into a page of its own."""
     return parts()
 
 
@@ -31,7 +31,7 @@ def viewed(ask: Ask) -> dict[str, Any] | None:
 
 
 def view(ask: Ask) -> Deferred:
-    """What the page asks, answered by the evaluation process."""
+    """An answer to the page, from the evaluation process."""
     question = ask.optional("question")
     if not isinstance(question, Mapping):
         raise InvalidParams("`question` is an object")

@@ -1,7 +1,7 @@
-"""Answers about whole files, put together from what is kept for each of their pieces as it is sent.
+"""Answers about whole files, put together from pieces that are kept in the form in which they are sent.
 
-Owns `Part`, `part_of`, `whole` and `Pieces`. After a key all parts but one are what they were; those below it are moved
-if there are more or fewer lines.
+Owns `Part`, `part_of`, `whole` and `Pieces`. After a key all parts but one are the same; those below it are moved if
+lines were added or removed.
 """
 
 from __future__ import annotations
@@ -22,23 +22,24 @@ _LINES = re.compile(r'"(line|startLine|endLine)":(\d+)')
 
 
 class Part(Struct, eq=False):
-    """The items of a piece: JSON with `%d` for each line, the lines from the piece's own first one on, and what was
-    made of them for one place."""
+    """The items of a piece as JSON with `%d` for each line, the line numbers relative to the piece, and the text for
+    the line where it was last placed."""
 
     template: str
     lines: tuple[int, ...]
     line: int = -1
-    text: str = ""
+    text: bytes = b""
 
-    def placed(self, line: int) -> str:
-        """The items of a piece that starts on a line."""
+    def placed(self, line: int) -> bytes:
+        """The items, for a piece that starts on this line."""
         if self.line != line:
-            self.line, self.text = line, self.template % tuple([line + own for own in self.lines])
+            text = self.template % tuple([line + own for own in self.lines])
+            self.line, self.text = line, text.encode("ascii")
         return self.text
 
 
 def part_of(items: Iterable[Any]) -> Part:
-    """Items of a piece, with lines counted from its first one."""
+    """The part for the items of a piece, whose lines count from its first one."""
     text = json.dumps(list(items), separators=(",", ":"))[1:-1].replace("%", "%%")
     lines = tuple([int(found[2]) for found in _LINES.finditer(text)])
     return Part(_LINES.sub(r'"\1":%d', text), lines)
@@ -52,7 +53,7 @@ def lined(ask: Ask) -> Iterator[tuple[PieceAt, int]]:
 
 
 def whole(ask: Ask, part: Callable[[PieceAt], Part], beside: Iterable[Any] = ()) -> Encoded:
-    """The items of all pieces, behind some that belong to none."""
+    """The items of all pieces, after those that belong to none."""
     found = [part_of(beside).placed(0)]
     found += [part(at).placed(line) for at, line in lined(ask)]
-    return Encoded(f"[{','.join([text for text in found if text])}]")
+    return Encoded(found)

@@ -65,6 +65,8 @@ class Condition(Struct, frozen=True):
     coordinates: as the definition sees them, calls of known functions carried out.
     anchor: the term of the definition itself that leads here: the branch, the delta, or the call.
     box: the variables of integration that occur, each with its bounds where they are constants.
+    path: the definitions that were entered on the way here; `written`: the coordinates as the text has them that it
+    stands in, mostly that of the last of these.
     """
 
     coordinates: tuple[Term, ...]
@@ -73,6 +75,8 @@ class Condition(Struct, frozen=True):
     delta: bool
     box: Mapping[str, tuple[float, float]]
     calls: tuple[str, ...] = ()
+    path: tuple[Global, ...] = ()
+    written: tuple[Term, ...] = ()
 
     def __hash__(self) -> int:
         """Without the box, which cannot be hashed."""
@@ -170,7 +174,7 @@ class _Place(Struct, frozen=True):
     """Where the walk is: what parameters stand for, which functions were passed, the calls that led here.
 
     `caller`: the variables of integration around the call that was entered first, or around that of a function that was
-    passed; None outside of calls.
+    passed; None outside of calls. `names`: the names of parameters here, each with the one in the text.
     """
 
     mapping: Mapping[str, Term]
@@ -179,6 +183,7 @@ class _Place(Struct, frozen=True):
     path: tuple[Global, ...]
     anchor: Term | None
     caller: frozenset[str] | None = None
+    names: Mapping[str, Term] = {}
 
 
 class _Walk:
@@ -225,7 +230,8 @@ class _Walk:
             return None
         box = {v: b for v, b in self.box.items() if any(v in c.free for c in coordinates)}
         strict, anchor = isinstance(node, Branch) and node.strict, place.anchor or node
-        return Condition(coordinates, strict, anchor, isinstance(node, Delta), box, place.calls)
+        written = tuple(substitute(c, place.names) for c in node.coordinates)
+        return Condition(coordinates, strict, anchor, isinstance(node, Delta), box, place.calls, place.path, written)
 
     def seen_through(self, term: Term, place: _Place) -> Term:
         known = {**place.mapping, **place.functions}
@@ -265,8 +271,8 @@ class _Walk:
         self.seen.add(key)
         inner = self.entered(function, given, place)
         if inner is not None:
-            body, mapping, functions = inner
-            there = _Place(mapping, functions, (*place.calls, name), path, place.anchor or node, caller)
+            body, mapping, functions, names = inner
+            there = _Place(mapping, functions, (*place.calls, name), path, place.anchor or node, caller, names)
             self.term(body, there)
 
     def followed(self, name: Global) -> tuple[Term | None, int]:
@@ -292,8 +298,8 @@ class _Walk:
 
     def entered(
         self, function: Lam, given: tuple[tuple[Term, ...], ...], place: _Place
-    ) -> tuple[Term, dict[str, Term], dict[str, Term]] | None:
-        """The callee's body with names of its own, and what its parameters stand for."""
+    ) -> tuple[Term, dict[str, Term], dict[str, Term], dict[str, Term]] | None:
+        """The callee's body with names of its own, what its parameters stand for, and which ones they are."""
         params, body = uncurry(function, sizes_of(given))
         args = arguments_of(function, given)
         if len(args) != len(params):
@@ -308,7 +314,7 @@ class _Walk:
                 functions[param] = arg
             else:
                 mapping[param] = arg
-        return body, mapping, functions
+        return body, mapping, functions, {o: var(p) for p, o in zip(params, own, strict=True)}
 
     def apart(self, body: Term, params: tuple[str, ...]) -> tuple[Term, tuple[str, ...]]:
         """A copy of the body in which neither parameters nor bound variables are called like anything met so far."""

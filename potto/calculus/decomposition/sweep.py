@@ -33,6 +33,7 @@ from potto.calculus.surfaces.case_split import by_extremes
 from potto.calculus.surfaces.discontinuities import Decide, Finding, Kind, Resolve, findings
 from potto.core.terms import Integral, Term, substitute
 
+MOST_EDGES = 24  # per variable, of densities further in, each of which has up to eight hints
 MOST_CUTS = 1200  # per variable; refinement doesn't see every weak kink that is left out
 
 
@@ -110,7 +111,7 @@ class _Pool(Struct):
         here = [edge for edge in self.edges if variable in edge.free]
         for edge in here:
             del self.edges[edge]
-        return points_of(here, variable)[:MOST_CENTERS]
+        return points_of(here, variable)[:MOST_EDGES]
 
     def left(self) -> tuple[Finding, ...]:
         return (

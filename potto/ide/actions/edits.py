@@ -39,8 +39,8 @@ def one_file(file: str, *edits: Edit) -> Change:
 
 
 def minimal(old: str, new: str, start: int = 0) -> tuple[Edit, ...]:
-    """Small edits from one text to another, of blanks alone if nothing else differs, else by lines and then within
-    them; `start` is added to the places."""
+    """Small edits from one text to another: only of blanks if nothing else differs, otherwise by lines and then within
+    them. `start` is added to the places."""
     if old == new:
         return ()
     if "".join(old.split()) == "".join(new.split()):

@@ -26,7 +26,7 @@ from potto.types import check_statement, interface
 
 
 class Offer(Struct, frozen=True):
-    """A code action that is not carried out yet. `rename_at` is where the new name is in the text after the change."""
+    """A code action that isn't carried out yet. `rename_at`: where the new name is in the text after the change."""
 
     title: str
     kind: ActionKind
@@ -76,7 +76,7 @@ def diagnostics_at(db: Database, file: str, span: Span) -> list[Diagnostic]:
 
 
 def taken_names(db: Database, chunk: ChunkAt) -> set[str]:
-    """Every name that means something in a chunk, or at the top of its file."""
+    """Every name with a meaning in a chunk or at the top of its file."""
     found = chunk.index(db)
     return {*scope(db, chunk.file), *(b.name for b in found.binders), *(o.name for o in found.occurrences)}
 

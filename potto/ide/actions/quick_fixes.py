@@ -55,7 +55,7 @@ def _suggested(place: At, said: Diagnostic) -> Iterator[Offer]:
 
 
 def _errors(chunk: ChunkAt, edits: Iterable[Edit]) -> int:
-    """How many errors a chunk has, as far as it can't be read, after some edits."""
+    """How many errors a chunk has after some edits, as far as it can't be read."""
     found = parse_chunk(applied(chunk.text, edits), chunk.diffeo).diagnostics
     return sum(said.severity == "error" for said in found)
 

@@ -51,7 +51,7 @@ _OPENERS = {
 
 
 def completions(db: Database, file: str, offset: int, trigger: str = "") -> Completions:
-    """What can stand at an offset. `trigger`: the character that was just typed, if that is why it is asked."""
+    """What can stand at an offset. `trigger`: the character that was just typed, if that is the reason for asking."""
     return _at(db, site_at(db, file, offset), trigger)
 
 
@@ -175,7 +175,7 @@ def _locals(db: Database, site: Site, place: Place) -> Iterator[Completion]:
 
 
 def _file_names(db: Database, site: Site, place: Place) -> Iterator[Completion]:
-    """The names at the top of the file, and behind an entry of a prompt those of the entries before."""
+    """The names at the top of the file; at a prompt also those of earlier entries."""
     file = site.file
     own = None if site.writing is None else owner(db, site.writing[0])  # a constant cannot be made of itself
     for each in (file, *preludes(db, file)):
@@ -195,14 +195,14 @@ def _file_names(db: Database, site: Site, place: Place) -> Iterator[Completion]:
 
 
 def fits(word: str, name: str) -> bool:
-    """Whether a name has the letters of a word in their order: an editor shows no others. In a file of a thousand
-    definitions to list them all takes longer than to find out."""
+    """Whether a name contains the letters of a word in their order: an editor shows no others. In a file of a thousand
+    definitions, listing them all takes longer than checking this."""
     letters = iter(name.casefold())
     return all(letter in letters for letter in word.casefold())
 
 
 def definition_item(db: Database, file: str, name: str, span: Span, group: str) -> Completion:
-    """A definition as a proposal. What kind it is shows in its text; its type waits until it is resolved."""
+    """A definition as a proposal. Its text shows its kind; its type is looked up on resolving."""
     kind: CompletionKind = written_kind(db, file, name)
     return Completion(name, kind, span, name, group + name, data=("definition", file, name))
 
@@ -246,7 +246,7 @@ def _keyword(keyword: Keyword, place: Place, group: str) -> Completion:
 
 
 def _fits(word: str, before: str, diffeo: bool) -> bool:
-    """Whether a word that goes on something can stand here: what it closes is open in front of it."""
+    """Whether a word that continues something can stand here: what it continues is open in front of it."""
     opener = _OPENERS.get(word)
     if opener is not None:
         closer = r"\bd\s*\(" if word == "d" else rf"\b{word}\b"
@@ -257,7 +257,7 @@ def _fits(word: str, before: str, diffeo: bool) -> bool:
 
 
 def _others(db: Database, file: str, place: Place, items: dict[str, Completion]) -> list[Completion]:
-    """Definitions of other modules: to take one imports it. What the import writes waits until it is resolved."""
+    """Definitions of other modules; choosing one imports it. The import is worked out on resolving."""
     found: list[Completion] = []
     for name, target in importable(db, file, place.word, items, MOST_IMPORTS):
         module = module_name(db, file, target)

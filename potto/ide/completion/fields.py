@@ -36,7 +36,7 @@ def part_items(db: Database, site: Site, place: Place) -> Iterator[Completion]:
 
 
 def changed_items(db: Database, site: Site, place: Place) -> Iterator[Completion]:
-    """The fields of a record that can stand behind `with`, those that are given already left out."""
+    """The fields of a record that can stand after `with`, except for those already given."""
     found = changed_at(site.text, place.span.start)
     if found is None or found[2]:
         return
@@ -49,8 +49,8 @@ def changed_items(db: Database, site: Site, place: Place) -> Iterator[Completion
 
 
 def changed_at(text: str, offset: int) -> tuple[int, tuple[str, ...], str] | None:
-    """The `with` that an offset is behind: where the record in front of it ends, the fields that are given so far, and
-    the one whose value is being written."""
+    """The `with` that an offset follows: where the record before it ends, the fields given so far, and the one whose
+    value is being written."""
     line = text[text.rfind("\n", 0, offset) + 1 : offset]
     for found in reversed(list(_WITH.finditer(line))):
         rest = line[found.end() :]

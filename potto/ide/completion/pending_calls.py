@@ -1,4 +1,4 @@
-"""The call that the cursor is in, found in the text alone: while it is typed, there is no tree of it yet.
+"""The call around the cursor, found in the text alone: while it is being typed it has no tree.
 
 Owns `call_at` (`call_in` in a chunk) and `juxtaposed_at`.
 """
@@ -60,7 +60,7 @@ def call_in(db: Database, chunk: ChunkAt, at: int) -> PendingCall | None:
 
 
 def juxtaposed_at(db: Database, file: str, offset: int) -> PendingCall | None:
-    """What is applied by writing its argument behind it: the cursor is behind a blank, as in `f (1, 2) |`."""
+    """The function that is applied by writing its argument after it, when the cursor follows a blank: `f (1, 2) |`."""
     chunk = chunk_at(db, file, offset)
     end = 0 if chunk is None else len(text_of(db, file)[chunk.start : offset].rstrip(" \t"))
     if chunk is None or end == offset - chunk.start or end > len(chunk.text):
@@ -75,7 +75,7 @@ def juxtaposed_at(db: Database, file: str, offset: int) -> PendingCall | None:
 
 
 def _blank_comments(db: Database, chunk: ChunkAt) -> str:
-    """The chunk's text with blanks for comments; the expression of a live comment stays."""
+    """The chunk's text with comments blanked out, except for the expressions of live ones."""
     text = chunk.text
     for comment in chunk.parsed(db).comments:
         head = 2 if comment.text.startswith("#>") else len(comment.text)
@@ -165,8 +165,8 @@ def _call(chunk: ChunkAt, text: str, start: int, open: int, at: int) -> PendingC
 
 
 def _arguments(text: str, start: int, end: int, inside: int | None = None) -> list[str]:
-    """The texts between commas outside of brackets; `inside`: until the parenthesis that closes the call, where so
-    many brackets of its arguments are open at the start."""
+    """The texts between commas outside of brackets. `inside`: up to the parenthesis that closes the call, with so many
+    brackets of its arguments open at the start."""
     parts: list[str] = []
     depth, last = inside or 0, start
     for position in range(start, end):

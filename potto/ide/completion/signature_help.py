@@ -62,7 +62,7 @@ def _of_call(db: Database, file: str, offset: int) -> SignatureHelp | None:
 
 
 def called_at(db: Database, file: str, call: PendingCall) -> Called | None:
-    """What a call is of, if that has a type: a definition, or a local name that is a function."""
+    """The function that is called, if it has a type: a definition, or a local name."""
     return called_in(db, file, call, chunk_at(db, file, call.function_span.start))
 
 

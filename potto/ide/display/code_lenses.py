@@ -23,7 +23,7 @@ LONG_CALL = 40  # characters of a call beyond which a title does not show it
 
 
 def code_lenses(db: Database, file: str) -> tuple[CodeLens, ...]:
-    """For each definition its value and what more can be done with it; for scripts: run."""
+    """For each definition its value and what more can be done with it; for a script, running it."""
     found: list[CodeLens] = []
     for at in pieces_of(db, file):
         for lens in piece_lenses(db, file, at.text, at.hidden):
@@ -34,7 +34,7 @@ def code_lenses(db: Database, file: str) -> tuple[CodeLens, ...]:
 
 @query(keep=1024)
 def piece_lenses(db: Database, file: str, text: str, hidden: tuple[str, ...]) -> tuple[CodeLens, ...]:
-    """Those of a piece of a file, relative to it. Of statements the first one can be run."""
+    """The lenses of a piece of a file, relative to it. Only the first statement can be run."""
     found: list[CodeLens] = []
     running = False
     for chunk, name in PieceAt(file, 0, text, hidden).chunks(db):

@@ -14,7 +14,7 @@ _FOLDED = (nodes.Integral, nodes.Let, nodes.Lambda, nodes.If, nodes.ListLiteral,
 
 
 def folding_ranges(db: Database, file: str) -> tuple[Fold, ...]:
-    """The folds of a file, in order; each covers two lines or more, and no two begin on the same line."""
+    """The folds of a file in order. Each covers at least two lines, and no two begin on the same line."""
     found = list(import_folds(db, file))
     for at in pieces_of(db, file):
         found += [Fold(fold.span.shift(at.start), fold.kind) for fold in piece_folds(db, at.text, is_diffeo(file))]

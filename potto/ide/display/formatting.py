@@ -31,7 +31,7 @@ def format_document(db: Database, file: str) -> tuple[Edit, ...]:
 
 
 def format_at_once(db: Database, file: str) -> tuple[Edit, ...] | None:
-    """The edits of a file in which all places move, or that is blank; None of any other."""
+    """The edits of a file in which every line moves, or that is blank; None for any other file."""
     text = text_of(db, file)
     if "\r" not in text and not text.startswith("\ufeff") and not text.isspace():
         return None
@@ -41,7 +41,7 @@ def format_at_once(db: Database, file: str) -> tuple[Edit, ...] | None:
 
 @query(keep=1024)
 def piece_edits(db: Database, text: str, diffeo: bool, first: bool, last: bool) -> tuple[Edit, ...]:
-    """The edits that lay out a piece of a file, relative to it: its chunks, and the blank lines behind each."""
+    """The edits that format a piece of a file, relative to it: its chunks, and the blank lines after each."""
     edits: list[Edit] = []
     chunks = piece(db, text, diffeo).chunks
     if first and chunks:
@@ -65,7 +65,7 @@ def _gap(text: str, start: int, end: int, wanted: str) -> tuple[Edit, ...]:
 
 @query(keep=4096)
 def laid_out(db: Database, text: str, diffeo: bool) -> str:
-    """A chunk's text laid out. Kept, so that to format a file again costs what was changed in it."""
+    """The formatted text of a chunk. It is kept, so that formatting a file again costs only what has changed."""
     return format_source(text, diffeo).rstrip("\r\n")
 
 

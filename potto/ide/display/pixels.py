@@ -1,7 +1,7 @@
-"""What a place of a picture comes from: the conditions of a function that is drawn, as functions of its parameters.
+"""The code behind a pixel of a picture: the conditions of the function that is drawn, as functions of its parameters.
 
-Owns `PixelCondition` and `pixel_conditions`. A pixel's integral goes over a small part of the plane, so its conditions
-are looked at in the middle of their ranges, as `checking/outlines` does.
+Owns `PixelCondition` and `pixel_conditions`. A pixel's integral covers a small part of the plane, so its conditions are
+evaluated in the middle of their ranges, as in `checking/outlines`.
 """
 
 from __future__ import annotations
@@ -10,23 +10,28 @@ from collections.abc import Mapping
 
 from msgspec import Struct
 
-from potto.calculus.checking.conditions import conditions_of
+from potto.calculus.checking.conditions import Condition, conditions_of
 from potto.calculus.checking.diffeo import exported
 from potto.calculus.inlining.currying import parameters_of
 from potto.core.printer import format_term
 from potto.core.simplify import simplify
-from potto.core.terms import App, Integral, Term, add, const, mul, postorder, substitute
+from potto.core.terms import App, Branch, Delta, Integral, Term, add, const, mul, postorder, substitute
 from potto.elaborate import core, core_term
-from potto.ide.hover.derivatives import condition_infos, sound
+from potto.ide.hover.derivatives import condition_infos, shown_equation, sound
 from potto.query import Database, query
 from potto.source import Span
 
 
 class PixelCondition(Struct, frozen=True):
-    """A condition of a definition. span: where it is written, or the call that leads to it, relative to its chunk.
-    text: a Potto function of `parameters` that is positive on one side of its surface and negative on the other."""
+    """A condition of a definition that is drawn.
+
+    file, name, span: where it is written, in the definition itself or in one that it calls, relative to the chunk of
+    that. text: a Potto function of `parameters` that is positive on one side of its surface and negative on the other.
+    """
 
     equation: str
+    file: str
+    name: str
     span: Span
     parameters: tuple[str, ...]
     text: str
@@ -34,27 +39,40 @@ class PixelCondition(Struct, frozen=True):
 
 @query
 def pixel_conditions(db: Database, file: str, name: str) -> tuple[PixelCondition, ...]:
-    """The conditions of a definition that its parameters alone decide, in the order of the text."""
+    """The conditions of a definition that depend on its parameters only, in the order of the text."""
     if not sound(db, file, name):
         return ()
     elaborated = core(db, file, name)
     spans, params, middles = dict(elaborated.origins), parameters_of(elaborated.term), _middles(elaborated.term)
-    shown = {info.span: info.equation for info in condition_infos(db, file, name) if not info.problem}
+    shown = {(info.span, info.equation) for info in condition_infos(db, file, name) if not info.problem}
     found: dict[PixelCondition, None] = {}
     for condition in conditions_of(
         elaborated.term, lambda g: exported(db, g.module, g.name), lambda g: core_term(db, g.module, g.name)
     ):
-        span, surface = spans.get(condition.anchor), _in_the_middle(condition.surface, middles)
-        if span not in shown or surface.free - set(params) or any(isinstance(n, App) for n in postorder(surface)):
+        span, equation = spans.get(condition.anchor), shown_equation(condition.surface)
+        surface = _in_the_middle(condition.surface, middles)
+        if span is None or (span, equation) not in shown or surface.free - set(params):
+            continue
+        if any(isinstance(n, App) for n in postorder(surface)):
             continue
         free = tuple(p for p in params if p in surface.free)
         text = f"\\({', '.join(free)}) . {format_term(simplify(surface))}"
-        found[PixelCondition(shown[span], span, free, text)] = None
-    return tuple(sorted(found, key=lambda each: each.span))
+        found[PixelCondition(equation, *_place(db, file, name, condition, span), free, text)] = None
+    return tuple(found)
+
+
+def _place(db: Database, file: str, name: str, condition: Condition, call: Span) -> tuple[str, str, Span]:
+    """The file, the definition and the span where a condition is written. If none of the definitions on the way
+    contains it, the call that leads to it."""
+    for module, called in ((g.module, g.name) for g in reversed(condition.path)):
+        for term, span in core(db, module, called).origins:
+            if isinstance(term, Branch | Delta) and term.coordinates == condition.written:
+                return module, called, span
+    return file, name, call
 
 
 def _middles(term: Term) -> dict[str, Term]:
-    """The middle of each variable of integration's range."""
+    """The middle of the range of each variable of integration."""
     return {
         name: mul(const(0.5), add(low, high))
         for node in postorder(term)
@@ -64,7 +82,8 @@ def _middles(term: Term) -> dict[str, Term]:
 
 
 def _in_the_middle(surface: Term, middles: Mapping[str, Term]) -> Term:
-    """A surface with each variable in the middle; those of inner ranges first, which may depend on outer ones."""
+    """A surface with each variable in the middle of its range. Inner ranges come first, since they may depend on outer
+    variables."""
     for _ in middles:
         inside = {name: middles[name] for name in surface.free & middles.keys()}
         if not inside:

@@ -55,14 +55,14 @@ Word = tuple[int, int, str, tuple[str, ...]]
 
 @query
 def definition_words(db: Database, file: str, name: str) -> tuple[Word, ...]:
-    """The coloured words of a definition, relative to its chunk: an edit elsewhere colours it from memory."""
+    """The coloured words of a definition, relative to its chunk. After an edit elsewhere they come from memory."""
     chunk = placeless(db, file, name)
     return () if chunk is None else tuple(_coloured(db, chunk, name))
 
 
 @query(keep=8192)
 def loose_words(db: Database, file: str, text: str) -> tuple[Word, ...]:
-    """Those of a statement, an import, a comment, or a definition that does not count."""
+    """The coloured words of a statement, an import, a comment, or a definition that doesn't count."""
     return tuple(_coloured(db, ChunkAt(file, 0, text, is_diffeo(file))))
 
 

@@ -1,4 +1,4 @@
-"""Hover of conditions: the diffeomorphism that one is, or why it is none; and plain ones, with what decides them.
+"""Hover of conditions: the diffeomorphism that one is, or why it isn't one; for plain conditions, what decides them.
 
 Owns `at_condition` and `condition_after`.
 """

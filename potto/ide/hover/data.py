@@ -15,7 +15,7 @@ from potto.types import format_type
 
 
 def data_markdown(db: Database, file: str, item: nodes.Definition | nodes.DiffeoDefinition) -> str:
-    """What the file holds that a definition loads; nothing for any other definition."""
+    """What is in the file that a definition loads; nothing for other definitions."""
     written = loaded_by(item)
     found = None if written is None else data_file(db, file, written)
     if found is None or isinstance(found, DataMistake):

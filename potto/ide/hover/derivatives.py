@@ -111,7 +111,7 @@ def _info(
     moved: tuple[str, ...],
     calls: tuple[str, ...],
 ) -> ConditionInfo:
-    shown, where = _terms(coordinates), _plain(equation(simplify(coordinates[0])))
+    shown, where = _terms(coordinates), shown_equation(coordinates[0])
     if isinstance(verdict, Problem):
         said = (*verdict.notes, *([verdict.help] if verdict.help else []))
         return ConditionInfo(
@@ -138,6 +138,11 @@ def _info(
         calls=calls,
         searched=bool(verdict.searched),
     )
+
+
+def shown_equation(surface: Term) -> str:
+    """Where a surface is, for a person to read."""
+    return _plain(equation(simplify(surface)))
 
 
 def _term(term: Term) -> str:

@@ -76,7 +76,7 @@ def _field(db: Database, symbol: LocalSymbol) -> str:
 
 
 def local_type(db: Database, symbol: LocalSymbol) -> Type:
-    """The type of a local name where it is bound; of a parameter, what it accepts."""
+    """The type of a local name where it is bound; for a parameter, the type that it accepts."""
     chunk, binder = symbol.chunk, symbol.binder
     name = owner(db, chunk)
     inside = live_at(chunk, binder.span.start)
@@ -179,7 +179,7 @@ def _variable(db: Database, chunk: ChunkAt, span: Span, variable: str, name: str
 
 
 def _bounded(node: nodes.Node | None, variable: str) -> Iterator[str]:
-    """The variables further in whose bounds mention a variable of integration."""
+    """The inner variables whose bounds mention a variable of integration."""
     if isinstance(node, nodes.Integral):
         for inner, bounds in zip(node.variables, node.bounds):
             if any(isinstance(part, nodes.Name) and part.id == variable for part in walk(bounds)):
@@ -231,7 +231,7 @@ def _value(db: Database, chunk: ChunkAt, span: Span, type: Type) -> list[str]:
 
 
 def _bound_to(binding: nodes.Binding, source: str, span: Span) -> Iterator[str]:
-    """What a name is bound to: of several names in parentheses, the part that belongs to it."""
+    """What a name is bound to; for one of several names in parentheses, its part."""
     value: nodes.Expr = binding.value
     which = ""
     if len(binding.targets) > 1:

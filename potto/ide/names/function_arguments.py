@@ -40,7 +40,7 @@ def fits(db: Database, file: str, name: str, type: Type, elsewhere: bool = True)
 
 
 def of_numbers(type: Type) -> Type:
-    """A type with numbers where any type will do: those are what a viewer sets."""
+    """A type with numbers wherever any type will do: a viewer can set numbers."""
     return rebuild(type, lambda part: REAL if isinstance(part, Var) else part)
 
 
@@ -73,7 +73,7 @@ def constant(type: Type) -> Iterator[str]:
 
 
 def numbers(type: Type) -> int:
-    """How many numbers a value has: 0 if it is neither a number nor a flat tuple of them."""
+    """How many numbers a value consists of; 0 if it is neither a number nor a flat tuple of numbers."""
     type = known(type)
     if isinstance(type, Real):
         return 1
@@ -89,7 +89,7 @@ def _passes(asked: tuple[Parameter, ...], taken: tuple[Parameter, ...]) -> bool:
 
 
 def _stars(type: Type) -> list[bool]:
-    """For each number that a type is made of whether it may vary; what may be anything may."""
+    """For each number in a type, whether it may vary. Where any type is allowed, it may."""
     type = known(type)
     if isinstance(type, TupleOf):
         return [star for item in type.items for star in _stars(item)]
@@ -135,7 +135,7 @@ def _imported(db: Database, file: str, groups: int) -> Iterator[Fitting]:
 
 
 def _elsewhere(db: Database, file: str) -> list[str]:
-    """The other programs of the workspace, those whose folders are nearest first."""
+    """The other programs of the workspace, those in the nearest folders first."""
     parts = os.path.dirname(file).split(os.sep)
 
     def distance(other: str) -> int:

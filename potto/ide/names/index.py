@@ -61,7 +61,7 @@ class Index(Struct, frozen=True):
     starts: tuple[int, ...]
 
     def at(self, offset: int) -> Occurrence | None:
-        """The name that an offset touches; of two that meet there, the one that begins there."""
+        """The name that an offset touches. If two meet there, the one that begins there."""
         place = bisect_right(self.starts, offset) - 1
         for candidate in (place, place - 1):
             if candidate >= 0:
@@ -353,7 +353,8 @@ class _Walk:
 
 
 def call_head(expr: nodes.Expr) -> tuple[nodes.Expr, int, int]:
-    """The function that a chain of calls starts from, how many groups it was given, and how often it was derived."""
+    """The function at the start of a chain of calls, how many groups of arguments it was given, and how often it was
+    differentiated."""
     given = derived = 0
     while True:
         if isinstance(expr, nodes.Paren):

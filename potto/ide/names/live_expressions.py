@@ -1,6 +1,6 @@
-"""Live expressions as the checker sees them: what is wrong with them, though they stand in comments.
+"""Live expressions as the checker sees them: what is wrong with them, although they are comments.
 
-Owns `live_in` and `live_diagnostics`. What they give is for who evaluates.
+Owns `live_in` and `live_diagnostics`.
 """
 
 from __future__ import annotations

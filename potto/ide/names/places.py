@@ -1,6 +1,6 @@
 """Where an offset of a file is: its chunk, its node, its word.
 
-Owns the way from absolute offsets to what is memoized relative to chunks, and back.
+Owns the conversion from absolute offsets to what is memoized relative to chunks, and back.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ NOWHERE = Span(0, 0)
 
 
 class Sketch(Struct, frozen=True):
-    """What a chunk is, the name that it defines, and where the name and all of it are, relative to the chunk."""
+    """What a chunk is, the name that it defines, and where the name and the whole are, relative to the chunk."""
 
     kind: Literal["definition", "import", "statement", "other"]
     span: Span = NOWHERE
@@ -91,15 +91,16 @@ def chunk_starts(db: Database, file: str) -> tuple[int, ...]:
 
 
 def chunk_at(db: Database, file: str, offset: int) -> ChunkAt | None:
-    """The chunk that an offset is in, or that ends before it; None in front of the first one."""
+    """The chunk that contains an offset, or ends before it; None in front of the first one."""
     place = bisect_right(chunk_starts(db, file), offset) - 1
     return None if place < 0 else chunk_of(file, chunks(db, file)[place])
 
 
 def writing_at(db: Database, file: str, offset: int) -> tuple[ChunkAt, int] | None:
-    """The chunk that goes on if something is typed at an offset, and the place in it (its end, for blanks after it).
+    """The chunk that continues if something is typed at an offset, and the place in it (its end, if only blanks
+    follow).
 
-    None at the beginning of a line behind a chunk: something new starts there.
+    None at the beginning of a line after a chunk: something new starts there.
     """
     chunk = chunk_at(db, file, offset)
     if chunk is None:
@@ -117,7 +118,8 @@ def writing_at(db: Database, file: str, offset: int) -> tuple[ChunkAt, int] | No
 class Site(Struct, frozen=True):
     """Where something is being typed: `offset` in `text`, seen from the names of `file`.
 
-    `chunk` is what the offset is in or follows; `writing` what goes on if something is typed here, and the place in it.
+    `chunk` contains or precedes the offset; `writing` is what continues if something is typed here, and the place in
+    it.
     """
 
     file: str
@@ -158,8 +160,8 @@ def all_chunks(db: Database, file: str, span: Span | None = None) -> tuple[Chunk
 class PieceAt(Struct, frozen=True):
     """A piece of a file, see `potto.syntax.chunks`; `start` is its place in the file.
 
-    `hidden`: what it defines that does not count, as the name is defined again further on. Questions about whole files
-    are asked piece by piece, with all but the place: after a key all but one are answered from memory.
+    `hidden`: names that it defines in vain, since they are defined again further on. Questions about whole files are
+    asked piece by piece, without the place: after a key all but one are answered from memory.
     """
 
     file: str

@@ -1,6 +1,6 @@
-"""The points at which definitions are looked at: calls in live expressions and statements, and how they change there.
+"""The points at which definitions are looked at: calls in live expressions and statements, and the slopes there.
 
-Owns `Point`, `points` and `point_of`. Only texts are made here; numbers are for who evaluates.
+Owns `Point`, `points` and `point_of`. These are only texts; whoever evaluates makes numbers of them.
 """
 
 from __future__ import annotations
@@ -25,17 +25,20 @@ USUAL = "0.5"  # where nothing is said
 
 
 class Point(Struct, frozen=True):
-    """A call with all its arguments. `slopes`: parameters, each with an expression whose tangent is the derivative by
-    it. `chosen`: nobody wrote this call, it stands for one."""
+    """A call with all its arguments. `slopes`: for each parameter, an expression whose tangent is the derivative by it.
+    `chosen`: nobody wrote this call, it is an example."""
 
     text: str
     slopes: tuple[tuple[str, str], ...] = ()
     chosen: bool = False
 
 
+OfTargets = tuple[tuple[tuple[str, str], Point], ...]  # points, each with the definition that it is one of
+
+
 @query
 def points(db: Database, file: str, name: str) -> tuple[Point, ...]:
-    """The points of a definition in its own file, a constant's being its name; one that we choose if there are none."""
+    """The points of a definition in its own file; for a constant, its name. If there are none, we choose one."""
     kind = kind_of(db, file, name)
     if kind != "function":
         return (Point(name),) if kind == "constant" else ()
@@ -51,16 +54,22 @@ def looked_at(db: Database, file: str) -> tuple[tuple[str, str], ...]:
 def _written(db: Database, file: str) -> Mapping[tuple[str, str], tuple[Point, ...]]:
     """The points in a file's expressions, under the definitions that they are of."""
     found: dict[tuple[str, str], dict[str, Point]] = {}
-    for group in groups_of_pieces(db, file):
-        for target, point in _group_points(db, file, group):
+    for group in _points_by_group(db, file):
+        for target, point in group:
             those = found.setdefault(target, {})
             if len(those) < MOST:
                 those.setdefault(point.text, point)
     return {target: tuple(those.values()) for target, those in found.items()}
 
 
+@query(cuts=True)
+def _points_by_group(db: Database, file: str) -> tuple[OfTargets, ...]:
+    """All of them. Most edits change nothing here."""
+    return tuple([_group_points(db, file, group) for group in groups_of_pieces(db, file)])
+
+
 @query(keep=512)
-def _group_points(db: Database, file: str, group: tuple[str, ...]) -> tuple[tuple[tuple[str, str], Point], ...]:
+def _group_points(db: Database, file: str, group: tuple[str, ...]) -> OfTargets:
     """Those of some pieces of the file: in live expressions and in statements."""
     diffeo = is_diffeo(file)
     chunks = (chunk for text in group for chunk in piece(db, text, diffeo).chunks)
@@ -86,7 +95,7 @@ def _looking(db: Database, text: str, diffeo: bool) -> tuple[str, ...]:
 
 @query(keep=8192)
 def points_in(db: Database, file: str, text: str) -> tuple[tuple[tuple[str, str], Point], ...]:
-    """The points in an expression in a file's scope, each with the definition that it is one of."""
+    """The points in an expression in the scope of a file, each with its definition."""
     made = (_point(db, file, text, call) for call in _calls(parse_expression(text).expr))
     return tuple(found for found in made if found is not None)
 
@@ -95,7 +104,7 @@ _THROUGH = nodes.Reduction | nodes.Fold | nodes.Comprehension
 
 
 def _calls(node: nodes.Node) -> Iterator[nodes.Apply]:
-    """The calls in a tree, the outer ones first; not those inside of what binds names."""
+    """The calls in a tree, outer ones first, except within anything that binds names."""
     if isinstance(node, nodes.Lambda | nodes.Let | nodes.Integral | _THROUGH):
         return
     if isinstance(node, nodes.Apply):
@@ -122,7 +131,7 @@ def _chosen(db: Database, file: str, name: str) -> tuple[Point, ...]:
 
 
 def _usual(db: Database, file: str, name: str, type: Type) -> str | None:
-    """What a parameter is given where nothing is said: a number, a tuple of them, or a function that fits."""
+    """The argument for a parameter without a known value: a number, a tuple of numbers, or a function that fits."""
     if _is_number(type):
         return USUAL
     if isinstance(resolve(type), Function):
@@ -140,7 +149,7 @@ def _is_number(type: Type) -> bool:
 
 
 def _point(db: Database, file: str, text: str, call: nodes.Apply) -> tuple[tuple[str, str], Point] | None:
-    """A call, or a call of a derivative, as a point of the definition that it calls."""
+    """A call, or a call of a derivative, as a point of its definition."""
     head, groups = _chain(call)
     called = callee(db, file, head)
     if called is None or called.given or called.derived > 1:
@@ -177,7 +186,7 @@ def _is_deriv(node: nodes.Apply) -> bool:
 
 
 def _function_text(head: nodes.Expr, text: str, name: str | None, derived: int) -> str | None:
-    """The text of the function itself, where `head` may be its derivative."""
+    """The text of the function, where `head` may be its derivative."""
     if not derived:
         return text[head.span.start : head.span.end]
     if isinstance(head, nodes.Apply):
@@ -233,7 +242,7 @@ def _has_numbers(type: Type) -> bool:
 def _slopes(
     function: str, wanted: tuple[tuple[Parameter, ...], ...], given: list[list[str]]
 ) -> Iterator[tuple[str, str]]:
-    """For each parameter that is a number, the dual call in which it alone moves."""
+    """For each parameter that is a number, the call with duals in which only this one moves."""
     for moving in (parameter for parameters in wanted for parameter in parameters):
         if moving.name is None or not _is_number(moving.type):
             continue

@@ -69,7 +69,7 @@ class MeasureSymbol(Struct, frozen=True):
 
 
 class PartSymbol(Struct, frozen=True):
-    """A part that has no definition: a column of a table, the `x` of a tuple. `whole` is the type of what it is of."""
+    """A part without a definition: a column of a table, the `x` of a tuple. `whole` is the type it is a part of."""
 
     name: str
     whole: Type
@@ -144,7 +144,7 @@ def meaning_of(db: Database, chunk: ChunkAt, occurrence: Occurrence) -> Symbol |
 
 
 def part(db: Database, chunk: ChunkAt, occurrence: Occurrence) -> Symbol | None:
-    """What the name of a part means: a field of a record is the parameter of the record's definition."""
+    """What the name of a part means. The field of a record is a parameter of the record's definition."""
     found = part_at(db, chunk, occurrence.span)
     if found is None:
         return None
@@ -177,7 +177,8 @@ def imported(db: Database, file: str, module: str, name: str) -> Symbol | None:
 
 
 class Callee(Struct, frozen=True):
-    """The definition that a call is of: how many groups were given before, and how often it was derived."""
+    """The definition that a call is of, how many groups of arguments were given before, and how often it was
+    differentiated."""
 
     file: str
     name: str
@@ -255,6 +256,6 @@ def home(db: Database, file: str, name: str) -> ChunkAt | None:
 
 
 def placeless(db: Database, file: str, name: str) -> ChunkAt | None:
-    """The chunk of a definition as if it stood at the head of its file: for queries, which must not read places."""
+    """The chunk of a definition as if it stood at the beginning of its file: queries must not read places."""
     text = chunk_text(db, file, name)
     return None if text is None else ChunkAt(file, 0, text, is_diffeo(file))

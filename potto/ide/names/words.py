@@ -76,7 +76,7 @@ KEYWORDS: dict[str, Keyword] = {keyword.name: keyword for keyword in _ALL}
 
 
 class Special(Struct, frozen=True):
-    """A builtin that is not a function of numbers: its type as people read it, and what it does."""
+    """A builtin that is not a function of numbers: its type for people to read, and what it does."""
 
     name: str
     type: str

@@ -21,7 +21,7 @@ SCRIPT = ""  # the statements of a script, as a caller
 
 
 def prepare_call_hierarchy(db: Database, file: str, offset: int) -> CallItem | None:
-    """The definition at an offset: the one that is named there, else the one that the offset is in."""
+    """The definition named at an offset, else the one that contains the offset."""
     found = symbol_at(db, file, offset)
     if found is not None and isinstance(found.symbol, DefinitionSymbol):
         return call_item(db, found.symbol.file, found.symbol.name)
@@ -38,7 +38,7 @@ def call_item(db: Database, file: str, name: str) -> CallItem:
 
 
 def incoming_calls(db: Database, file: str, name: str) -> tuple[Call, ...]:
-    """The definitions that use one, and scripts that do, with the places."""
+    """The definitions and scripts that use a definition, with the places."""
     callers: dict[tuple[str, str], list[Span]] = {}
     scripts: dict[str, ChunkAt] = {}
     for chunk, occurrence in occurrences_of(db, file, DefinitionSymbol(file, name)):

@@ -32,10 +32,8 @@ def document_links(db: Database, file: str) -> tuple[DocumentLink, ...]:
 
 
 def linked_editing(db: Database, file: str, offset: int) -> tuple[Span, ...]:
-    """The places of a local name, its binder among them, if they can be edited together; else nothing.
-
-    Parameters that calls name are left to a rename: their places are in other chunks too.
-    """
+    """The places of a local name, including its binder, if they can be edited together; otherwise none. Parameters that
+    calls name are left to a rename, since they also occur in other chunks."""
     found = symbol_at(db, file, offset)
     if found is None or not isinstance(found.symbol, LocalSymbol) or found.occurrence.binder < 0:
         return ()

@@ -20,7 +20,7 @@ from potto.syntax import nodes
 
 
 def rename_files(db: Database, renames: Sequence[FileRename]) -> Change:
-    """The edits of imports for files (or folders) that are about to move; the moves themselves are not among them."""
+    """The edits of imports for files (or folders) that are about to move. The moves themselves are not included."""
     moved = _moved(db, renames)
     if not moved:
         return Change(())
@@ -104,7 +104,7 @@ def _members(db: Database, file: str, paths: Mapping[str, str]) -> list[Edit]:
 
 
 def _written(db: Database, file: str, module: str, moved: Mapping[str, str]) -> str | None:
-    """How an import is to be written after the move; None if it can stay as it is."""
+    """How an import must be written after the move; None if it can stay."""
     target = find_module(db, file, module)
     if target is None or (target not in moved and file not in moved):
         return None

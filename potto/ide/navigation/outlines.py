@@ -22,7 +22,7 @@ LONG_LABEL = 60
 
 
 def document_symbols(db: Database, file: str) -> tuple[DocumentSymbol, ...]:
-    """The definitions of a file in order, each with its parameters and local names; statements of scripts as well."""
+    """The definitions of a file in order, each with its parameters and local names; also the statements of a script."""
     return tuple(
         [
             _shifted(symbol, at.start)
@@ -110,7 +110,7 @@ def _child_kind(binder: Binder) -> SymbolKind:
 
 
 def workspace_symbols(db: Database, text: str) -> tuple[WorkspaceSymbol, ...]:
-    """The definitions of the workspace whose names hold the letters of `text` in their order, the likeliest first."""
+    """The definitions of the workspace whose names contain the letters of `text` in this order, the likeliest first."""
     wanted = text.casefold()
     scored: list[tuple[int, str, str]] = []
     for folded, name, file in exports(db):

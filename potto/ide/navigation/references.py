@@ -35,7 +35,7 @@ Place = tuple[ChunkAt, Occurrence]
 
 
 def references(db: Database, file: str, offset: int, declaration: bool = True) -> tuple[Location, ...]:
-    """All places that mean what the name at an offset means; `declaration`: where it is bound or defined as well."""
+    """All places with the meaning of the name at an offset. `declaration`: include where it is bound or defined."""
     found = symbol_at(db, file, offset)
     if found is None or found.symbol is None:
         return ()
@@ -92,7 +92,7 @@ def _files(db: Database, *own: str) -> tuple[str, ...]:
 
 @query
 def aliases(db: Database) -> Mapping[str, frozenset[str]]:
-    """The names that imports anywhere in the workspace give to a name; a table, to be read by entry."""
+    """The names that imports in the workspace give to a name. A table, to be read by entry."""
     found: dict[str, set[str]] = {}
     for file in files(db):
         for item in imports(db, file):

@@ -40,7 +40,7 @@ Bound = tuple[str, str]  # a file, and a name at the top of it
 
 
 def prepare_rename(db: Database, file: str, offset: int) -> Renaming | Refused | None:
-    """What a rename at an offset would change; why it can't; None where there is no name."""
+    """What a rename at an offset would change, or why it is impossible; None if there is no name."""
     found = symbol_at(db, file, offset)
     if found is None:
         return None
@@ -171,7 +171,7 @@ def _root(db: Database, start: Bound) -> Bound:
 
 
 def _family(db: Database, root: Bound, file: str) -> tuple[Bound, ...]:
-    """The names in all files that are this one, passed on without another name."""
+    """The names in all files that stand for this one, passed on without another name."""
     name = root[1]
     found = {root: None}
     candidates = [each for each in dict.fromkeys((file, *files(db))) if mentions(db, each, name)]

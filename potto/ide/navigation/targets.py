@@ -26,7 +26,7 @@ MOST_STEPS = 20
 
 
 def definition(db: Database, file: str, offset: int) -> Links | None:
-    """Where the name at an offset is defined; of the name of a data file, that file."""
+    """Where the name at an offset is defined; for the name of a data file, that file."""
     found = symbol_at(db, file, offset)
     return _data_link(db, file, offset) if found is None else _links(found.span, place_of(db, found))
 
@@ -54,7 +54,7 @@ def _column(db: Database, path: str, name: str) -> Location:
 
 
 def declaration(db: Database, file: str, offset: int) -> Links | None:
-    """Where this file got the name at an offset from: its import, else its definition."""
+    """Where this file got the name at an offset: its import, else its definition."""
     found = symbol_at(db, file, offset)
     if found is None:
         return None

@@ -165,7 +165,7 @@ def count_slivers(scene: Scene, cuts: Cuts, sums: Sums) -> None:
         either = apart[:, None] * np.where(np.isfinite(sliver.passes), sliver.passes, 0.0)
         sums.et[:, :, sliver.owner] += swept[:, None] + np.where(np.isfinite(either), either, 0.0)
         if not machine.side and (hidden := (either > 0) & np.isfinite(either)).any():
-            named = TwoSided(scene.level.variable, scene.surface(sliver.cuts[0]))
+            named = TwoSided(scene.level.variable, scene.surface(sliver.cuts[0]), hidden=True)
             machine.note(named, scene.below(sliver.owner[hidden.any(axis=(0, 1))]))
         if len(set(sliver.cuts)) < len(sliver.cuts):  # nothing is known of how a surface moves where it folds
             sums.et[:, :, sliver.owner] += np.where((lost > 0) & ~np.isfinite(sliver.speed), np.inf, 0.0)[:, None]

@@ -49,7 +49,7 @@ def count_narrow(
             met = owner[spreads & _at_ends(seg)[part]]
             if met.size:
                 surface = scene.parent.plan.groups[groups[0]].cut.surface
-                scene.machine.note(TwoSided(scene.level.variable, surface), scene.below(met))
+                scene.machine.note(TwoSided(scene.level.variable, surface, hidden=True), scene.below(met))
 
 
 def _at_ends(seg: Segments) -> Bools:

@@ -1,9 +1,9 @@
 """Answers to one integral by several ways, of which the best one counts.
 
-Owns `proved_beforehand`, `Attempt`, `attempted`, `uncertainty` and `best`. An order of the variables that runs into
-roots that merge, or into kinks at places that nobody knows, takes a hundred times what another one takes. So each is
-tried with few evaluations before any of them gets all, and what was found on the way is kept: no way makes an answer
-worse that another one had.
+Owns `proved_beforehand`, `Attempt`, `attempted`, `uncertainty`, `accurate` and `best`. An order of the variables that
+runs into roots that merge, or into kinks at places that nobody knows, takes a hundred times what another one takes. So
+each is tried with few evaluations before any of them gets all, and what was found on the way is kept: no way makes an
+answer worse that another one had.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from potto.core.terms import Integral
 from potto.integrate.events import BUDGET_SPENT, Events, Shortfall
 from potto.integrate.fixed.a_priori import Crowded, certain
 from potto.integrate.pieces import Sums
+from potto.runtime.evaluation.machine import Machine
 from potto.runtime.integration.choices import preferred
 from potto.runtime.integration.problem import Problem
 from potto.runtime.integration.quadrature import in_parts
@@ -71,6 +72,13 @@ def uncertainty(sums: Sums) -> float:
     with np.errstate(divide="ignore", invalid="ignore"):
         parts = np.maximum(sums.e, sums.et.max(axis=1, initial=0.0)) / size
     return float(np.where(np.isfinite(parts), parts, np.inf).max(initial=0.0))
+
+
+def accurate(sums: Sums, limit: float, machine: Machine) -> bool:
+    """Whether the errors are within a relative limit."""
+    fine = sums.e <= np.maximum(limit * np.abs(sums.v), machine.atol)
+    size = np.maximum(np.abs(sums.t), np.abs(sums.v)[:, None])  # a rate may be 0
+    return bool(fine.all() and (sums.et <= np.maximum(limit * size, machine.atol)).all())
 
 
 def best(attempts: Sequence[Attempt]) -> Attempt:

@@ -5,13 +5,10 @@ Owns `step_by_step` and `eliminated`.
 
 from __future__ import annotations
 
-import numpy as np
-
 from potto.integrate.elimination.recursion import AFFORDABLE, Eliminated, one_by_one
 from potto.integrate.events import Fold
 from potto.integrate.pieces import Sums
-from potto.runtime.evaluation.machine import Machine
-from potto.runtime.integration.attempts import Attempt
+from potto.runtime.integration.attempts import Attempt, accurate
 from potto.runtime.integration.one_sided import beside_folds
 from potto.runtime.integration.problem import Problem
 
@@ -63,10 +60,3 @@ def _member(known: Eliminated, problem: Problem) -> Sums | None:
 
 class _NotEvaluated(Exception):
     """A step has no table."""
-
-
-def accurate(sums: Sums, limit: float, machine: Machine) -> bool:
-    """Whether the errors are within a relative limit."""
-    fine = sums.e <= np.maximum(limit * np.abs(sums.v), machine.atol)
-    size = np.maximum(np.abs(sums.t), np.abs(sums.v)[:, None])  # a rate may be 0
-    return bool(fine.all() and (sums.et <= np.maximum(limit * size, machine.atol)).all())

@@ -163,7 +163,7 @@ def by_cuts(problem: Problem, order: Integral, sums: Sums, which: Bools) -> None
     few = problem.picked(index).apart()
     found = iterated(problem.plan(order), few.machine, few.env, index.size)
     better = (found.e < sums.e[:, index]).all(axis=0) & (found.et <= sums.et[:, :, index]).all(axis=(0, 1))
-    better &= ~few.events.touched(index.size)
+    better &= ~few.events.uncounted(index.size)
     for name in ("v", "e", "t", "et"):
         getattr(sums, name)[..., index[better]] = getattr(found, name)[..., better]
 

@@ -109,7 +109,7 @@ def in_another_order(problem: Problem, order: Integral, sums: Sums) -> Sums:
     for other in itertools.islice(orders(order), 1, None):
         part = few.apart()
         found = iterated(problem.plan(other), part.machine, part.env, index.size)
-        better = (found.et < sums.et[:, :, index]) & ~part.events.touched(index.size)
+        better = (found.et < sums.et[:, :, index]) & ~part.events.uncounted(index.size)
         sums.t[:, :, index] = np.where(better, found.t, sums.t[:, :, index])
         sums.et[:, :, index] = np.where(better, found.et, sums.et[:, :, index])
     return sums

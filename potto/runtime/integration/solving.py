@@ -25,10 +25,10 @@ from potto.integrate.pieces import Sums, still
 from potto.integrate.plan import Plan
 from potto.kernels.cells import Ints
 from potto.runtime.integration.at_kinks import at_kinks
-from potto.runtime.integration.attempts import Attempt, attempted, best, proved_beforehand, uncertainty
+from potto.runtime.integration.attempts import Attempt, accurate, attempted, best, proved_beforehand, uncertainty
 from potto.runtime.integration.choices import many, passes_on, preferred, too_many, trial, worth_trials
 from potto.runtime.integration.differences import by_differences
-from potto.runtime.integration.elimination import ACCURATE, WORTH, accurate, eliminated, step_by_step
+from potto.runtime.integration.elimination import ACCURATE, WORTH, eliminated, step_by_step
 from potto.runtime.integration.members import by_members, one_by_one
 from potto.runtime.integration.one_sided import at_folds, beside_axes, on_both_sides
 from potto.runtime.integration.problem import Problem

@@ -69,7 +69,13 @@ export interface Range {
 /** Where a pixel comes from: the definition, and its conditions, the nearest first; `pixels` is how far off one is. */
 export interface Pixel {
   readonly range: Range;
-  readonly conditions: readonly { readonly equation: string; readonly range: Range; readonly side: number; readonly pixels: number }[];
+  readonly conditions: readonly {
+    readonly equation: string;
+    readonly uri: string;
+    readonly range: Range;
+    readonly side: number;
+    readonly pixels: number;
+  }[];
 }
 
 export type ToPreview =

@@ -197,7 +197,7 @@ class Preview {
     }
   }
 
-  /** A pixel was clicked: select the condition that it is nearest to, or the definition if there is none. */
+  /** A pixel was clicked: select the condition that it is nearest to, wherever it is written, or the definition if there is none. */
   private async find(request: PixelRequest): Promise<void> {
     try {
       const params = { textDocument: { uri: this.uri.toString() }, ...request };
@@ -206,8 +206,11 @@ class Preview {
       const nearest = found.conditions.find(({ pixels }) => pixels < FAR);
       const { start, end } = nearest?.range ?? { start: found.range.start, end: found.range.start };
       const selection = new vscode.Range(start.line, start.character, end.line, end.character);
-      const column = vscode.window.visibleTextEditors.find(({ document }) => document.uri.toString() === this.uri.toString())?.viewColumn;
-      await vscode.window.showTextDocument(this.uri, { viewColumn: column ?? vscode.ViewColumn.One, selection });
+      const uri = nearest ? vscode.Uri.parse(nearest.uri) : this.uri;
+      const columnOf = (wanted: vscode.Uri): vscode.ViewColumn | undefined =>
+        vscode.window.visibleTextEditors.find(({ document }) => document.uri.toString() === wanted.toString())?.viewColumn;
+      const column = columnOf(uri) ?? columnOf(this.uri);
+      await vscode.window.showTextDocument(uri, { viewColumn: column ?? vscode.ViewColumn.One, selection });
       this.send({ type: "pixel", text: nearest ? placed(nearest) : `no condition of ${request.name} is seen here` });
     } catch (error) {
       this.send({ type: "pixel", text: messageOf(error) });
