@@ -176,3 +176,23 @@ def test_a_section_at_infinity_beside_one_beyond_the_bounds() -> None:
     for h in (f, g):
         for answer in (h(0.0, 0.125), h(np.zeros(300), np.full(300, 0.125))):
             assert (np.abs(answer.value - 1 / 8) <= answer.error).all()
+
+
+def test_a_bound_that_moves_under_an_infinite_range() -> None:
+    """Cuts of an infinite range were put on its bounds where derivatives to either side were looked at. Over y in
+    [0, x + s] the integrand is 1 below y = s, unless 0.7 x is above s, and e^sin(1) elsewhere."""
+    s = 1.0197915289425734
+    f = potto.compile(
+        """def f(s) integral ([-inf, inf], [0, x + s]) exp(sin([s <= max(y, 0.7*x)]) - (x - 0.9)^2) d(x, y)"""
+    ).f
+    e = mp.exp(mp.sin(1))
+
+    def weighed(rate: Callable[[Any], Any], *ends: Any) -> Any:
+        return mp.quad(lambda x: rate(x) * mp.exp(-((x - mp.mpf(0.9)) ** 2)), ends)
+
+    # 1 for the bound below x = 0, then one for the step and e for the bound, then e; at x = s/0.7 s more of the step.
+    edge = mp.mpf(s) / mp.mpf("0.7")
+    exact = weighed(lambda x: 1, -8, -s, 0) + weighed(lambda x: 1, 0, edge) + weighed(lambda x: e, edge, 4, 10)
+    exact -= (e - 1) * s / mp.mpf("0.7") * mp.exp(-((edge - mp.mpf(0.9)) ** 2))
+    answer = potto.deriv(f)((s, 1.0))
+    assert abs(answer.tangent - exact) <= answer.tangent_error < 1e-9

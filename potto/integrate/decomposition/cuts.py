@@ -178,9 +178,10 @@ def on_bounds(
     found = []
     for number, row in enumerate(rows):
         x = roots[number]
+        size = np.where(np.isfinite(reach), reach, 1 + np.abs(x))  # of an infinite range no part tells anything
         for bound, speed, e in ends if row.cut >= 0 and plan.level.cuts[row.cut].decides else ():
-            near = np.clip(off[number] + e, NARROW * reach, ONE_PLACE * reach)
-            near = (np.abs(x - bound) <= near) & (x != bound)
+            near = np.clip(off[number] + e, NARROW * size, ONE_PLACE * size)
+            near = (np.abs(x - bound) <= near) & (x != bound) & np.isfinite(bound)
             near &= (t[:directions, number + 1] != speed).any(axis=0)
             if near.any():
                 owner = np.nonzero(near)[0]
