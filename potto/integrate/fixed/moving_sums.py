@@ -85,23 +85,21 @@ class Totals(Struct, frozen=True):
 
 def summed(
     variables: Sequence[str], frames: Sequence[Lam], region: Region, machine: Evaluator, env: dict[str, Value],
-    frame: tuple[Cell, ...] | None = None,
+    frame: tuple[Cell, ...],
 ) -> Totals | None:  # fmt: skip
     """Weighted sums over the nodes of all cells: value and tangents, with their rounding. None where cuts cross.
 
-    frames: per variable its bounds and cuts, as functions of what is further out. frame: the values of the first; None
-    where it is known that no cuts cross.
+    frames: per variable its bounds and cuts, as functions of what is further out; `frame` has the values of the first.
     """
     tracked, here, layout, k = machine.tracking(), dict(env), _layout(region), machine.directions
     shape: tuple[int, ...] = (1,)
     length = rounded = layout.weights
-    ordered = frame is None
     for i, variable in enumerate(variables):
-        if i or frame is None:
+        if i:
             frame = evaluated(frames[i], tracked, here)
         block = _block(frame, k, shape) if i else _numbers(frame, k)
         ends = block.take(layout.ends[i], axis=2)
-        if i and not ordered and _crossed(block[0, 0].reshape(len(frame), *shape), *ends[0, 0]):
+        if i and _crossed(block[0, 0].reshape(len(frame), *shape), *ends[0, 0]):
             return None
         lo, width, off = _between(ends)
         for name in variables[:i]:
