@@ -196,3 +196,28 @@ def test_a_bound_that_moves_under_an_infinite_range() -> None:
     exact -= (e - 1) * s / mp.mpf("0.7") * mp.exp(-((edge - mp.mpf(0.9)) ** 2))
     answer = potto.deriv(f)((s, 1.0))
     assert abs(answer.tangent - exact) <= answer.tangent_error < 1e-9
+
+
+@pytest.mark.parametrize("backend", ["numpy", "native"])
+@pytest.mark.parametrize("plain", ["0.3*t", "0.3*t*y/0.95"])
+def test_what_is_small_beside_what_is_plain_falls_no_faster(plain: str, backend: Any) -> None:
+    """Of a box that nothing cuts: d/dt is 0.3*h^2 and, from the bell's edge, h*(b(0.9 - t) - b(0.9 + h - t))."""
+    f = potto.compile(f"""
+def f(t, u, v) integral ([u, u + 0.1], [v, v + 0.1]) {plain} + exp(-(y - t)^2*40) d(x, y)
+""").f
+    u, v, t, h = np.zeros(100), np.full(100, 0.9), 0.309, 0.1
+    with potto.settings(backend=backend, rtol=1e-6):
+        answer = potto.grad(f, ["t"])(t, u, v)
+    exact = 0.3 * h * h + h * (math.exp(-40 * (0.9 - t) ** 2) - math.exp(-40 * (0.9 + h - t) ** 2))
+    assert (np.abs(answer.tangent - exact) <= answer.tangent_error + 1e-17).all()
+
+
+def test_roots_that_merge_in_one_of_many_steps() -> None:
+    """The surface of a step has its own number there: it crashed. (1 - s)*2*(s + e^(-2s)/2), since e^y > y + 1."""
+    f = potto.compile("""
+def f(t, s) integral ([s, 1], y ~ exponential(2), [-1, 1]) max(y, s)*[exp(y*t) - y - 1 > 0] d(z, y, x)
+""").f
+    s = 1 + 1e-9
+    with potto.settings(rtol=1e-4, max_evals=200_000):
+        answer = potto.grad(f, ["t", "s"])(1.0, s)
+    assert abs(answer.value - (1 - s) * (2 * s + math.exp(-2 * s))) <= answer.error

@@ -257,6 +257,10 @@ class BoxText(RuleText):
         middle = max(n // 2 - 2, 0)
         end, before, half = (at.apply("add", sizes[i], sizes[i + 1]) for i in (n - 2, n - 4, middle))
         last = at.apply("div", end, before)
+        if n <= 4:
+            ratios = at.apply("div", end, sizes[n - 3]), at.apply("div", sizes[n - 1], sizes[n - 2])
+            last = self.greater(*ratios)
+            last = at.apply("mul", last, last)
         mean = last
         if n >= SLOWING:
             mean = at.apply("div", end, half)

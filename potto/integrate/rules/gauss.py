@@ -63,9 +63,13 @@ def truncation(size: Array, singular: Bools | bool = False) -> Array:
     n = size.shape[-1]
     middle = max(n // 2 - 2, 0)
     end = size[..., -1] + size[..., -2]
-    before = size[..., -3] + size[..., -4]
     half = size[..., middle] + size[..., middle + 1]
-    last, mean = end / before, (end / half) ** (2 / (n - 2 - middle))
+    if n > 4:
+        before = size[..., -3] + size[..., -4]
+        last, mean = end / before, (end / half) ** (2 / (n - 2 - middle))
+    else:  # beside what is plain, a constant or linear, all others are small: that says nothing of how fast they fall
+        before = size[..., -3]
+        last = mean = np.fmax(end / before, size[..., -1] / size[..., -2]) ** 2
     decay = np.fmin(np.fmax(np.fmax(last, mean), 0.0), 1.0)
     power = 4.5 if n >= 10 else 4.0 if n >= 8 else 2.0
     share = np.fmax(decay**power, np.fmin(1.0, (decay - 0.3) / 0.3))

@@ -49,13 +49,23 @@ def _member(known: Eliminated, problem: Problem) -> Sums | None:
 
     row = one_by_one(known, problem.machine, problem.env, AFFORDABLE)
     folds = problem.events.every(Fold)
-    if row is None or not folds or any(fold.number for fold, _ in folds):
+    if row is None or not folds or not all(_outermost(fold, known) for fold, _ in folds):
         return row
     try:
         beside_folds(problem.changed(solver=tabled), known.plans[0], row)
     except _NotEvaluated:
         return None
     return row
+
+
+def _outermost(fold: Fold, known: Eliminated) -> bool:
+    """Whether a fold is one of a surface that cuts the outermost variable: the steps have cuts of their own."""
+    level = known.plans[0].levels[0]
+    return (
+        fold.number == 0
+        and fold.cause.variable == level.variable
+        and any(fold.cut == number and cut.surface is fold.cause.surface for number, cut in enumerate(level.level.cuts))
+    )
 
 
 class _NotEvaluated(Exception):
