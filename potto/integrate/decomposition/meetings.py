@@ -200,12 +200,13 @@ def folds_at(
         for other in others[:-1]:
             merged = merged | (x == other)
         plain = not (cut.decides or row.turning or cut.turning)
-        if plain and not merged.any():
+        unknown = np.isnan(tangents(row.t, batch, directions)).any(axis=0)
+        if plain and not (merged.any() or unknown.any()):
             continue
         fast: Any = np.zeros(batch, dtype=bool)
         if (cut.decides or plain) and any(not np.isfinite(t).all() for t in row.t if t is not None):
             fast = ~np.isfinite(tangents(row.t, batch, directions)).all(axis=0)
-        folded = merged & fast if plain else merged | fast
+        folded = unknown | (merged & fast if plain else merged | fast)
         if row.hides is not None and cut.decides and not nested:
             flat = row.hides > FLAT * (1 + np.abs(x))
             folded = folded | (flat & (tangents(row.t, batch, directions) != 0).any(axis=0))

@@ -33,6 +33,7 @@ BISECTIONS = 64
 # lies there is refined like all else that is not smooth. 256 of them take as long as 0.3 s.
 MOST_KINKS = 256
 JUMP = 8.0  # a surface that is so many times its rounding, and that of the place, where its sign changes jumps there
+LEVEL = 1e-9  # a slope that is such a part of that beside it is none
 BESIDE = 2.0**-27  # how far from a pole, as a part of where it is, it is asked how it moves
 
 
@@ -241,15 +242,24 @@ class _Along(Struct, frozen=True, dict=True):
             jumps = np.abs(value.v) > JUMP * (rounding + step * np.abs(slope))
             off = np.where(jumps, np.minimum(off, within), off)
             off = np.where(np.isfinite(off), off, 0.0) + step
-            # What stands still does so also where the surface is flat, and 0/0 would say nothing.
-            t = tuple(None if x is None else np.where(np.asarray(x) == 0, 0.0, -np.asarray(x) / slope)
-                      for x in value.t[:k])  # fmt: skip
+            still = [x is not None and (np.asarray(x) == 0) for x in value.t[:k]]
+            flat = self.flat(root, slope) if any(np.any(part) for part in still) else False
+            t = tuple(None if x is None else np.where(part, np.where(flat, np.nan, 0.0), -np.asarray(x) / slope)
+                      for x, part in zip(value.t, still, strict=False))  # fmt: skip
         et = self.doubt(root + off, t, value) if k else ()
         poles = np.isfinite(root) & ~np.isfinite(np.broadcast_to(value.v, root.shape))
         if k and poles.any():
             near = self.beside_poles(root)
             t = tuple(np.where(poles, x, 0.0 if y is None else y) for x, y in zip(near, t, strict=True))
         return Row(root, t, self.cut, False, off, et)
+
+    def flat(self, root: Array, slope: Any) -> Any:
+        """Whether the surface is flat at its root: what stands still there may move all the same, as the root of
+        x^3 + t^2*x - t^3 at t = 0 does, where both its derivatives are 0."""
+        if not np.any(np.abs(slope) < LEVEL):
+            return False
+        steep = self.with_slopes(root + BESIDE * (1 + np.abs(root))).t[self.machine.directions]
+        return np.abs(slope) <= LEVEL * np.abs(0.0 if steep is None else steep)
 
     def doubt(self, beside: Array, t: tuple[Any, ...], value: Cell) -> tuple[Any, ...]:
         """How far off speeds may be, by the rounding of the derivatives that they are made of (`value`), and as the
