@@ -67,7 +67,7 @@ def fit(
             hint = f"did you mean `{near[0]}`?" if near else ""
             raise wrong_call(f"a bound is given for `{name}`, which is not fitted", hint)
     gradient = grad(function, names)
-    begun = {path: _begun(".".join(path), value) for path, value in _leaves(start)}
+    begun = _starts(start)
 
     def objective(x: Array) -> Seen:
         answer = gradient(**_named(begun, x), **given)
@@ -77,17 +77,26 @@ def fit(
 
     sides = {name: _sides(name, (bounds or {}).get(name)) for name in names}
     limits = [sides[path[0]] for path, value in begun.items() for _ in _labels(value)]
-    numbers = {
-        f"{'.'.join(path)}{label}": float(number)
-        for path, value in begun.items()
-        for label, number in zip(_labels(value), np.ravel(value), strict=True)
-    }
+    numbers = numbers_of(start)
     if not numbers:
         raise wrong_call("the arrays to fit have no elements")
     if checkpoint is not None:
         numbers, progress = kept(checkpoint, numbers), keeping(checkpoint, tuple(numbers), progress)
     found = minimized(objective, numbers, limits, steps, progress, method)
     return replace(found, parameters=_named(begun, np.array(list(found.numbers.values()))))
+
+
+def numbers_of(start: Mapping[str, Any]) -> dict[str, float]:
+    """The numbers that parameters are made of, by name, such as `ws[0]` and `camera.focal`."""
+    return {
+        f"{'.'.join(path)}{label}": float(number)
+        for path, value in _starts(start).items()
+        for label, number in zip(_labels(value), np.ravel(value), strict=True)
+    }
+
+
+def _starts(start: Mapping[str, Any]) -> dict[Path, Any]:
+    return {path: _begun(".".join(path), value) for path, value in _leaves(start)}
 
 
 def _leaves(start: Mapping[str, Any], path: Path = ()) -> Iterator[tuple[Path, Any]]:

@@ -18,10 +18,12 @@ if TYPE_CHECKING:
     from potto.applications.minimizing import Fit, Step
     from potto.evaluating.world import World
     from potto.runtime.answers.estimate import Estimate
+    from potto.types.types import Type
 
 SUMMARY = "find the parameters that make a function least, along its derivatives"
 EXAMPLE = """  potto fit lamp.po loss angle=0.2 height=1 --with shader=lin --bound angle=0:1.5
   potto fit lamp.po light angle=0.2 --data measured.csv --target brightness --trace steps.csv"""
+MOST_SHOWN = 6  # numbers in a line of progress
 EVERY = 1.0  # seconds between lines of progress where no one line can be overwritten
 
 
@@ -120,17 +122,10 @@ def _fitted(
 
     Raises PottoError; OSError and ValueError for the table.
     """
-    from potto.applications.fitting import fit
-    from potto.kernels.errors import wrong_call
+    from potto.applications.fitting import fit, numbers_of
 
     function = function_in(world, file, options.name)
-    start: dict[str, float] = {}
-    for name, text in options.start:
-        value = argument_in(world, file, text)
-        if not isinstance(value, float):
-            help = f"numbers are fitted; what stays as it is goes behind --with: `--with {name}=…`"
-            raise wrong_call(f"`{name}` starts at something that is not a number", help)
-        start[name] = value
+    start = {name: _start(world, file, name, text) for name, text in options.start}
     given = arguments_in(world, file, options.given)
     target: Any = None
     columns = read_table(options.data) if options.data else {}
@@ -143,8 +138,30 @@ def _fitted(
                          "name the column of what is measured with --target")  # fmt: skip
     bounds = dict(options.bound)
     return fit(function, start, given={**given, **columns}, bounds=bounds, target=target, steps=options.steps,
-               progress=_Progress(tuple(start), console), watch=answers.append, method=options.way,
+               progress=_Progress(tuple(numbers_of(start)), console), watch=answers.append, method=options.way,
                checkpoint=options.checkpoint)  # fmt: skip
+
+
+def _start(world: World, file: str, name: str, text: str) -> Any:
+    """What a parameter starts at: numbers, records as dicts. Raises PottoError."""
+    from potto.kernels.errors import wrong_call
+
+    help = f"numbers are fitted; what stays as it is goes behind --with: `--with {name}=…`"
+    if text.startswith("@"):  # a table of thousands of numbers is what a fit is to, hardly ever what is fitted
+        raise wrong_call(f"`{name}` starts at the numbers of a file, which are data", help)
+    value, (_, type) = argument_in(world, file, text), world.typed(file, text)
+    if callable(value):
+        raise wrong_call(f"`{name}` starts at something that is not a number", help)
+    return _by_fields(value, type)
+
+
+def _by_fields(value: Any, type: Type) -> Any:
+    """A record, which is a tuple as a value, as a dict of its fields."""
+    from potto.types.types import TupleOf
+
+    if not isinstance(type, TupleOf) or type.record is None:
+        return value
+    return {name: _by_fields(v, t) for name, v, t in zip(type.record.fields, value, type.items, strict=True)}
 
 
 class _Progress:
@@ -156,7 +173,8 @@ class _Progress:
     def __call__(self, step: Step) -> None:
         from potto.runtime.answers.printing import format_digits, format_error
 
-        at = ", ".join(f"{n} = {format_digits(v)}" for n, v in zip(self.names, step.parameters, strict=True))
+        shown = list(zip(self.names, step.parameters, strict=True))
+        at = ", ".join(f"{n} = {format_digits(v)}" for n, v in shown[:MOST_SHOWN]) + ", …" * (len(shown) > MOST_SHOWN)
         line = f"step {step.number}: {format_digits(step.value)} at {at}, slope {format_error(step.slope)}"
         self.console.progress(line)
         if not self.console.err.isatty() and time.perf_counter() - self.last > EVERY:
@@ -187,7 +205,7 @@ def _write_trace(found: Fit, path: str) -> None:
     rows: list[dict[str, Any]] = []
     for step in found.steps:
         row = asdict(step)
-        parameters = dict(zip(found.parameters, row.pop("parameters"), strict=True))
+        parameters = dict(zip(found.numbers, row.pop("parameters"), strict=True))
         rows.append({"step": row.pop("number"), **parameters, **row})
     with open(path, "w", encoding="utf-8", newline="") as stream:
         if path.endswith(".json"):
@@ -218,7 +236,7 @@ def _tell(found: Fit, options: argparse.Namespace, console: Console) -> None:
     count = len(found.steps) - 1
     if options.json:
         console.answer_json({
-            "parameters": found.parameters, "value": json_number(found.value), "slope": json_number(found.slope),
+            "parameters": found.numbers, "value": json_number(found.value), "slope": json_number(found.slope),
             "converged": found.converged, "reason": found.reason, "steps": count, "evaluations": found.evaluations,
             "seconds": found.seconds, "error": json_number(found.error),
         })  # fmt: skip

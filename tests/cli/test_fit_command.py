@@ -38,6 +38,19 @@ def test_what_is_not_fitted_is_told_where_it_goes(potto: Potto) -> None:
     assert potto("fit", "p.po", "shaded", "t=0.5", "--with", "s=id").status == 0
 
 
+@pytest.mark.parametrize("start", [["ws=[0, 0]", "l=Line((0, 1), 1)"], ["l=Line((0, 0), 0)", "ws=[1, 1]"]])
+def test_arrays_tuples_and_records_are_fitted(potto: Potto, tmp_path, start: list[str]) -> None:
+    """A sum of squares that is 0 in one place."""
+    program = """
+record Line(at: (Real, Real), b: Real)
+def miss(ws: [2] Real, l: Line) (ws[0] - 1)^2 + (ws[1] + ws[0])^2 + (l.at.x - 3)^2 + (l.at.y - ws[1])^2 + (l.b - 2)^2
+"""
+    wanted = {"ws[0]": 1, "ws[1]": -1, "l.at[0]": 3, "l.at[1]": -1, "l.b": 2}
+    answer = potto("fit", "q.po", "miss", *start, "--trace", "t.csv", "--json", q=program).json
+    assert answer["converged"] and answer["parameters"] == pytest.approx(wanted, abs=1e-7, rel=0)
+    assert set(wanted) < set(next(csv.DictReader((tmp_path / "t.csv").open())))
+
+
 def test_a_table_of_measurements(potto: Potto, tmp_path) -> None:
     (tmp_path / "t.csv").write_text(TABLE)
     ran = potto("fit", "p.po", "box", "b=0.7", "--with", "a=1", "--data", "t.csv", "--target", "y", p=PROGRAM)
