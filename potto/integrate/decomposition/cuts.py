@@ -180,7 +180,7 @@ def on_bounds(
         x = roots[number]
         size = np.where(np.isfinite(reach), reach, 1 + np.abs(x))  # of an infinite range no part tells anything
         for bound, speed, e in ends if row.cut >= 0 and plan.level.cuts[row.cut].decides else ():
-            near = np.clip(off[number] + e, NARROW * size, ONE_PLACE * size)
+            near = np.clip(off[number] + e, NARROW * np.abs(bound), ONE_PLACE * size)
             near = (np.abs(x - bound) <= near) & (x != bound) & np.isfinite(bound)
             near &= (t[:directions, number + 1] != speed).any(axis=0)
             if near.any():
