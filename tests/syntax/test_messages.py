@@ -95,6 +95,8 @@ def test_unfinished() -> None:
         #       ^ error[P0104]: expected `:` after the first choice of `? :`
         x = sum i in 1..n i
         #                 ^ error[P0104]: expected the body of `sum` in parentheses
+        x = sum i in 0..len(u)-1 u
+        #                        ^ error[P0104]: expected the body of `sum` in parentheses
         x = integral x d(x)
         #   ^^^^^^^^ error[P0104]: expected the bounds after `integral`
         x = integral [0] x d(x)
