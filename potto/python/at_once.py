@@ -9,48 +9,81 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import Any, Literal
 
 from msgspec import Struct
 from msgspec.structs import asdict
 
-from potto.core.terms import Lam, Term
+from potto.core.terms import Lam
 from potto.integrate.costs import wanted
 from potto.kernels.cells import Cell, Value
 from potto.projects.settings import Settings
 from potto.python.arguments import LARGEST
 from potto.runtime.answers.estimate import Estimate
 from potto.runtime.evaluate import Clock, Program, stats_of
+from potto.runtime.evaluation.duals import merge
+from potto.runtime.evaluation.functions import Closure
 from potto.runtime.evaluation.machine import WATCHING, Machine
 from potto.runtime.evaluation.record import Record, watched
-from potto.runtime.integration.direct import SettledAround, SettledCall
+from potto.runtime.integration.direct import Direct, SettledAround, SettledCall
 
 # What is not the same when the same is asked again.
 TIMES = {"seconds", "compile_seconds", "stats"}
+NUMBERS = float, int
+
+
+class Read(Struct, frozen=True, eq=False):
+    """What an argument is like: a number, with these tangents; a dual, whose tangent is `part`; or a function, whose
+    value is `part`."""
+
+    name: str
+    kind: Literal["number", "dual", "function"]
+    t: tuple[Any, ...] = ()
+    et: tuple[Any, ...] = ()
+    part: Any = None
+
+    def of(self, arg: Any) -> Any:
+        """The argument as the integral takes it; None if it is of another kind."""
+        if self.kind == "function":
+            known = getattr(arg, "_value", None)
+            value = None if known is None else known()
+            if value is None or value is self.part:
+                return value
+            alike = type(value) is type(self.part) is Closure and value.lam is self.part.lam and not value.captured
+            return value if alike else None
+        if self.kind == "dual":
+            if arg.__class__ is not tuple or len(arg) != 2 or arg[1].__class__ not in NUMBERS or arg[1] != self.part:
+                return None
+            arg = arg[0]
+        if arg.__class__ is not float:
+            if not isinstance(arg, float) and (arg.__class__ is not int or abs(arg) > LARGEST):
+                return None
+            arg = float(arg)
+        return Cell(arg, None, self.t, self.et)
 
 
 class AtOnce(Struct, frozen=True, eq=False):
-    """What a call, or its gradient, takes for numbers in a region. tangents: of each argument, and their errors."""
+    """What a call, or its gradient, takes for numbers in a region."""
 
     settings: Settings
     settled: SettledCall | SettledAround
-    tangents: tuple[tuple[str, tuple[Any, ...], tuple[Any, ...]], ...]
+    reads: tuple[Read, ...]
     stats: Mapping[str, Any]
     made: Callable[..., Estimate]
     wrt: tuple[str, ...]
+    dual: bool
 
     def answer(self, args: tuple[Any, ...], settings: Settings) -> Estimate | None:
         """The estimate; None where only the general way has it."""
         start = time.perf_counter()
-        if len(args) != len(self.tangents) or settings != self.settings or _looked_at():
+        if len(args) != len(self.reads) or settings != self.settings or _looked_at():
             return None
         env: dict[str, Cell] = {}
-        for (name, t, et), arg in zip(self.tangents, args, strict=True):
-            if arg.__class__ is not float:
-                if not isinstance(arg, float) and (arg.__class__ is not int or abs(arg) > LARGEST):
-                    return None
-                arg = float(arg)
-            env[name] = Cell(arg, None, t, et)
+        for read, arg in zip(self.reads, args, strict=True):
+            value = read.of(arg)
+            if value is None:
+                return None
+            env[read.name] = value
         found = self.settled.at(env)
         if found is None:
             return None
@@ -60,7 +93,9 @@ class AtOnce(Struct, frozen=True, eq=False):
                 return None
         first: tuple[Any, ...] = (None, None)
         rest: tuple[Any, ...] = ()
-        if self.wrt:
+        if self.dual:
+            first = number[1], error[1]
+        elif self.wrt:
             one = len(self.wrt) == 1
             first = (number[1], error[1]) if one else (tuple(number[1:]), tuple(error[1:]))
             rest = (self.wrt,)
@@ -70,31 +105,47 @@ class AtOnce(Struct, frozen=True, eq=False):
 
 
 def at_once(
-    program: Program, term: Term, values: Sequence[Value], machine: Machine, found: Estimate, wrt: tuple[str, ...]
-) -> AtOnce | None:
+    program: Program, term: Lam, args: tuple[Any, ...], values: Sequence[Value], machine: Machine, found: Estimate,
+    wrt: tuple[str, ...],
+) -> AtOnce | None:  # fmt: skip
     """What a call takes that has just been answered, for numbers near these; None where the general way is needed.
 
-    values: of the arguments, with their tangents. machine: that for this many tangents. found: the answer, by `wrt`.
+    args, values: the arguments, as they were given, and with their tangents. machine: that for this many tangents.
+    found: the answer, by `wrt`.
     """
-    assert isinstance(term, Lam)
-    cells = [value for value in values if type(value) is Cell and value.v.__class__ is float and value.e is None]
-    if len(cells) != len(values) or len(term.params) != len(values) or not found.converged or _looked_at():
+    if not len(term.params) == len(values) == len(args) or not found.converged or _looked_at():
         return None
-    env = dict(zip(term.params, cells, strict=True))
     direct = program.shortest(term.body)
-    settled = None if direct is None else direct.settled(_clean(machine), env)
-    if settled is None:
+    dual = isinstance(direct, Direct) and direct.dual
+    read = [_read(name, arg, value, dual) for name, arg, value in zip(term.params, args, values, strict=True)]
+    reads = tuple(each for each in read if each is not None)
+    if direct is None or len(reads) != len(read):
+        return None
+    given = {each.name: each.of(arg) for each, arg in zip(reads, args, strict=True)}
+    settled = direct.settled(_clean(machine), dict(zip(term.params, values, strict=True)))
+    if settled is None or any(value is None for value in given.values()):
         return None
     with Clock() as clock:
-        totals = settled.at(env)
+        totals = settled.at(given)
     if totals is None:
         return None
-    integrals = found.stats["integrals"]
-    stats = stats_of(Record(evaluations=totals.nodes, integrals=integrals), clock)
-    tangents = tuple((name, cell.t, cell.et) for name, cell in env.items())
-    kept = AtOnce(machine.settings, settled, tangents, stats, type(found), wrt)
-    again = kept.answer(tuple([cell.v for cell in cells]), machine.settings)
+    stats = stats_of(Record(evaluations=totals.nodes, integrals=found.stats["integrals"]), clock)
+    kept = AtOnce(machine.settings, settled, reads, stats, type(found), wrt, dual)
+    again = kept.answer(args, machine.settings)
     return kept if again is not None and _told(again) == _told(found) else None
+
+
+def _read(name: str, arg: Any, value: Value, dual: bool) -> Read | None:
+    """What an argument is like; None if it is nothing of that kind."""
+    if isinstance(value, Closure):
+        known = getattr(arg, "_value", None)
+        return None if known is None else Read(name, "function", part=known())
+    moving = merge(value) if dual and not isinstance(value, list) else value
+    if type(moving) is not Cell or moving.v.__class__ is not float or moving.e is not None or any(moving.et):
+        return None
+    if isinstance(value, tuple):
+        return Read(name, "dual", moving.t, moving.et, arg[1]) if arg.__class__ is tuple else None
+    return Read(name, "number", moving.t, moving.et)
 
 
 def _clean(machine: Machine) -> Machine:

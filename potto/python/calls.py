@@ -47,11 +47,7 @@ class Call(Struct, frozen=True, eq=False):
         with Clock() as clock:
             value = self.value(values, machine)
         estimate = report(value, machine, clock)
-        if self._gives_dual():
-            return batch.shaped(as_dual(estimate))
-        if batch.shape is None:
-            self.keep(values, machine, estimate, ())
-        return batch.shaped(estimate)
+        return batch.shaped(as_dual(estimate) if self._gives_dual() else estimate)
 
     def at_once(self, args: tuple[Any, ...], wrt: tuple[str, ...] = ()) -> Estimate | None:
         """The estimate for plain numbers near those of before, with its derivatives by the parameters named; None
@@ -59,11 +55,15 @@ class Call(Struct, frozen=True, eq=False):
         known: AtOnce | None = self.world.memory.get((self, wrt))
         return None if known is None else known.answer(args, current(self.world.settings(self.file)))
 
-    def keep(self, values: Sequence[Value], machine: Machine, found: Estimate, wrt: tuple[str, ...]) -> None:
-        """Keep what answers such calls at once, if anything does."""
-        term = self.elaborated
+    def keep(
+        self, args: Sequence[Any], values: Sequence[Value], found: Estimate, wrt: tuple[str, ...] = (),
+        machine: Machine | None = None,
+    ) -> None:  # fmt: skip
+        """Keep what answers such calls at once, if anything does. args: as they were given. machine: for tangents."""
+        term, program = self.elaborated, self.world.program
         if values and isinstance(term, Lam):
-            known = at_once(self.world.program, term, values, machine, found, wrt)
+            machine = machine or program.machine(current(self.world.settings(self.file)))
+            known = at_once(program, term, tuple(args), values, machine, found, wrt)
             if known is not None:
                 self.world.memory[self, wrt] = known
 

@@ -81,7 +81,10 @@ class Function(Travelling):
             return known
         kinds = () if kwargs or self._given else kinds_of(args)
         if kinds and self._fitting.get(kinds) == self._world.db.revision:
-            return self._call(((args, kwargs),)).run(numbers_of(args), NUMBERS)
+            call, values = self._call(((args, kwargs),)), numbers_of(args)
+            found = call.run(values, NUMBERS)
+            call.keep(args, values, found)
+            return found
         given = (*self._given, (args, kwargs))
         rest = groups_of(self._type)[1:]
         if rest and (args or kwargs) and len(args) + len(kwargs) <= len(groups_of(self._type)[0]):
@@ -103,7 +106,10 @@ class Function(Travelling):
         kinds = () if len(given) != 1 or given[0][1] else kinds_of(asked[0][0])
         if kinds and given == asked:
             self._fitting[kinds] = self._world.db.revision
-        return in_tiles(self, given, (), arguments, batch)
+        found = in_tiles(self, given, (), arguments, batch)
+        if batch.shape is None and len(asked) == 1 and not asked[0][1]:
+            self._call(given).keep(asked[0][0], [value for _, value in arguments], found)
+        return found
 
     def in_tiles(self, args: tuple[Any, ...], kwargs: dict[str, Any], wrt: tuple[str, ...]) -> Estimate:
         """The estimate of a call with its derivatives by the parameters named; a large batch in tiles."""

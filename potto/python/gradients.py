@@ -326,8 +326,9 @@ class _Run:
 
     def keep(self, found: Estimate, wrt: tuple[str, ...]) -> None:
         """Keep what answers a call of this kind at once, if anything does."""
-        if not self.whole:
-            self.call.keep(*self.moved, found, wrt)
+        values, machine = self.moved
+        if not self.whole and all(isinstance(value, Cell) for value in values):
+            self.call.keep([value.v for value in values], values, found, wrt, machine)  # type: ignore[union-attr]
 
     def answer(self, value: Value, tangents: Any, bounds: Any) -> Estimate:
         found = report(value, self.machine, self.clock)

@@ -109,6 +109,10 @@ def test_calls_near_those_of_before_are_answered_the_same(backend: str, monkeypa
         lambda c: module.f(c),
         lambda c: potto.grad(module.f)(c),
         lambda c: potto.grad(module.two, ("b", "a"))(-c, 0.5),
+        lambda c: potto.grad(module.loss, ("d", "c"))(c, 0.25),
+        lambda c: module.shaded(-c, module.shader),
+        lambda c: potto.deriv(module.shaded)((-c, 1.0), potto.deriv(module.shader)),
+        lambda c: potto.deriv(module.two)((-c, 1.0), (0.5, -2.0)),
     ]
 
     def told(found: potto.Estimate) -> tuple[object, ...]:

@@ -80,12 +80,12 @@ class Direct(Struct, frozen=True):
 
     def settled(self, machine: Machine, env: Mapping[str, Value]) -> SettledCall | None:
         """What is known of the call for all numbers near these, if it is the same for all of them."""
-        working = machine.inside()
-        here, rule = ({}, None) if self.dual else self._prepared(machine, working, env)
+        working = (machine.with_directions(1) if self.dual else machine).inside()
+        here, rule = self._prepared(machine, working, env)
         found = None if rule is None else settled(rule, working, here)
         if found is None:
             return None
-        fixed = {name: pad(place, machine.directions) for name, place in self.places if isinstance(place, Cell)}
+        fixed = {name: pad(place, working.directions) for name, place in self.places if isinstance(place, Cell)}
         given = tuple((name, place) for name, place in self.places if isinstance(place, str))
         return SettledCall(found, fixed, given)
 
