@@ -56,7 +56,16 @@ def _guarded(arguments: list[str]) -> int:
         sys.stderr.write(f"potto: what is said cannot be written: {(error.strerror or str(error)).lower()}\n")
         return FAILED
     except Exception as error:
+        if _of_interrupt(error):
+            raise KeyboardInterrupt from error
         return _crashed(arguments, error)
+
+
+def _of_interrupt(error: BaseException | None) -> bool:
+    """Whether an interrupt is behind it: one that comes while a class is made is told as a RuntimeError."""
+    while error is not None and not isinstance(error, KeyboardInterrupt):
+        error = error.__cause__ or error.__context__
+    return error is not None
 
 
 def _crashed(arguments: list[str], error: Exception) -> int:

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 import potto
+from potto.__main__ import main
 
 ROOT = Path(__file__).resolve().parents[2]
 COMMAND = [sys.executable, "-m", "potto"]
@@ -107,3 +108,14 @@ def test_who_does_not_is_ended(words: list[str]) -> None:
     process.send_signal(signal.SIGINT)
     out, _ = process.communicate(timeout=120)
     assert process.returncode in (130, -signal.SIGINT) and out == ""  # the second before the command has taken over
+
+
+def test_an_interrupt_while_a_class_is_made_is_one(monkeypatch: pytest.MonkeyPatch, capsys) -> None:
+    """Python 3.11 tells it as a RuntimeError."""
+
+    class Named:
+        def __set_name__(self, owner: type, name: str) -> None:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr("potto.cli.command_line.dispatch", lambda arguments: type("Made", (), {"part": Named()}))
+    assert main(["eval", "1"]) == 130 and "interrupted" in capsys.readouterr().err

@@ -279,7 +279,7 @@ def _started(folder: Path, *words: str) -> subprocess.Popen[str]:
 
 def _interrupted(folder: Path, *words: str) -> tuple[int, str, str]:
     """The end of a command that is interrupted once it has something to show: later on a machine that is busy."""
-    for seconds in (4.0, 12.0, 40.0):
+    for seconds in (4.0, 5.5, 7.5, 10.0, 14.0, 20.0, 40.0):
         process = _started(folder, *words)
         time.sleep(seconds)
         process.send_signal(signal.SIGINT)
