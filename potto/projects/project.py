@@ -65,6 +65,8 @@ class Projects:
 
     def of(self, path: str) -> Project | None:
         """The project of a file or folder; None if there is no project file in its folder or above."""
+        if path in self._known:
+            return self._known[path]
         if not os.path.isabs(path):
             return None
         above: list[str] = []

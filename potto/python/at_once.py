@@ -80,6 +80,9 @@ class AtOnce(Struct, frozen=True, eq=False):
             return None
         env: dict[str, Cell] = {}
         for read, arg in zip(self.reads, args, strict=True):
+            if arg.__class__ is float and read.kind == "number":  # as most are
+                env[read.name] = Cell(arg, None, read.t, read.et)
+                continue
             value = read.of(arg)
             if value is None:
                 return None
