@@ -8,7 +8,7 @@ VSCODE := editors/vscode
 TORCH ?= torch==2.13.0
 TESTS := $(BIN)/python -m pytest -n auto --maxprocesses 8 --dist worksteal --durations 20
 
-.PHONY: docs wheels demo gallery test quick fuzz check format clean native pictures test-bridges hours vsix e2e
+.PHONY: tables docs wheels demo gallery test quick fuzz check format clean native pictures test-bridges hours vsix e2e
 
 demo: $(STAMP)  ## the paper's programs, evaluated and differentiated
 	@PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/python examples/demo.py
@@ -40,6 +40,9 @@ check: $(STAMP)  ## lints, types, floors
 	$(BIN)/ruff format --check --quiet .
 	$(BIN)/mypy
 	$(BIN)/python -m pytest tests/test_architecture.py
+
+tables: $(STAMP)  ## potto/syntax/tables.json: what the parser reads, of the grammar as it is now
+	$(BIN)/python -c 'from potto.syntax.tables import write; write()'
 
 native:  ## .venv-native: the packages as they stand, with the front end as machine code (needs a C compiler)
 	test -x .venv-native/bin/python || $(PYTHON) -m venv .venv-native

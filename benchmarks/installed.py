@@ -1,7 +1,6 @@
 """What an installation leaves behind, so that processes are timed as users have them.
 
-Owns `as_installed` and `front_end`. pip compiles what it installs, but not a working copy that is used where it stands;
-and the tables of the grammar are made once.
+Owns `as_installed` and `front_end`. pip compiles what it installs, but not a working copy that is used where it stands.
 """
 
 from __future__ import annotations
@@ -11,16 +10,14 @@ from pathlib import Path
 
 from potto.query import Database
 from potto.quick import is_compiled
-from potto.syntax.tables import tables
 
 PACKAGES = ("potto", "lsp/potto_lsp", "repl/potto_repl")
 
 
 def as_installed() -> None:
-    """Compile the packages, as far as they are not, and make the tables of the grammar in the folder for caches."""
+    """Compile the packages, as far as they are not."""
     for package in PACKAGES:
         compileall.compile_dir(Path(__file__).parent.parent / package, quiet=1)
-    tables()
 
 
 def front_end() -> str:

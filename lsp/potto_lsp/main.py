@@ -13,6 +13,7 @@ import sys
 from itertools import chain
 from typing import BinaryIO
 
+from potto_lsp import memory
 from potto_lsp.greeting import greet
 from potto_lsp.wire import Outbox, messages
 
@@ -49,9 +50,10 @@ def _talk(reader: BinaryIO, writer: BinaryIO) -> int:
     if first is None:
         outbox.close()
         return 1
-    greeted = greet(first, outbox)
+    with memory.loading():
+        greeted = greet(first, outbox)
 
-    from potto_lsp.server import Server
+        from potto_lsp.server import Server
 
     return Server(chain([first], received), outbox, greeted).run()
 

@@ -10,7 +10,7 @@ from potto.cli.console import Console
 SUMMARY = "what Potto keeps on disk between runs: where, of which kinds, how much; --clear"
 EXAMPLE = "  potto cache --clear"
 # What is kept beside the store, and where.
-_BESIDE = {"parse tables": "grammar-*.json", "verdicts": "checked-*/*.json"}
+_BESIDE = {"verdicts": "checked-*/*.json"}
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -43,7 +43,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     console.answer(f"folder: {report.folder}  (POTTO_CACHE; `off` keeps nothing)")
     for name, (n, b) in {**kinds, "in all": (count, size)}.items():
         console.answer(f"  {name:<14} {n:>7,} file{' ' if n == 1 else 's'} {b / 1e6:>10,.3f} MB")
-    console.answer(f"at most {report.bound / 1e6:,.0f} MB beside tables and verdicts  (POTTO_CACHE_MB)")
+    console.answer(f"at most {report.bound / 1e6:,.0f} MB beside verdicts  (POTTO_CACHE_MB)")
     if options.clear:
         console.answer("cleared")
     return 0

@@ -1,15 +1,14 @@
-"""The LALR tables of the grammar: computed by lark once, then read from a cache in the user's cache folder.
+"""The LALR tables of the grammar: computed by lark when the grammar is changed, and read from `tables.json` beside it.
 
-Owns `Tables` and `tables()`. lark is imported only when the cache has to be filled: importing it costs more than
-everything else here. The cache is JSON under a name that holds a hash of the grammar, so that it can neither run code
-nor be stale; when it can't be read or written, the tables are computed again.
+Owns `Tables`, `tables()`, and `write`, which makes the file: `make tables`. lark is imported only where the
+file is not that of the grammar, while the grammar is worked on: importing it and computing costs a cold start more than
+everything else here. The file is JSON with a digest of the grammar, so that it can neither run code nor be stale.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
-import os
 from collections.abc import Iterator
 from functools import lru_cache
 from pathlib import Path
@@ -17,10 +16,8 @@ from typing import Any
 
 from msgspec import Struct
 
-from potto.store import cache_folder
-
 STARTS = ("chunk", "expression")
-_FORMAT = 2
+FILE = Path(__file__).with_name("tables.json")
 
 
 class Rule(Struct, frozen=True):
@@ -47,17 +44,29 @@ def grammar_text() -> str:
 
 @lru_cache(maxsize=1)
 def tables() -> Tables:
-    """The tables of the grammar, from the cache if it has them."""
+    """The tables of the grammar."""
+    return written() or compute(grammar_text())
+
+
+def written() -> Tables | None:
+    """The tables in the file; None if they are of another grammar."""
+    data = json.loads(FILE.read_text(encoding="utf-8"))
+    if data["grammar"] != _digest(grammar_text()):
+        return None
+    return Tables(tuple([Rule(*rule) for rule in data["rules"]]), tuple(data["rows"]), data["starts"], data["ends"])
+
+
+def write() -> None:
+    """Compute the tables of the grammar and write the file."""
     grammar = grammar_text()
-    key = hashlib.sha256(f"{_FORMAT}\n{grammar}".encode()).hexdigest()[:24]
-    folder = cache_folder()
-    if folder is None:
-        return compute(grammar)
-    path = folder / f"grammar-{key}.json"
-    cached = _read(path)
-    if cached is None:
-        _write(path, cached := compute(grammar))
-    return cached
+    made = compute(grammar)
+    rules = [[rule.origin, rule.size, rule.action] for rule in made.rules]
+    data = {"grammar": _digest(grammar), "rules": rules, "rows": made.rows, "starts": made.starts, "ends": made.ends}
+    FILE.write_text(json.dumps(data, separators=(",", ":")) + "\n", encoding="utf-8")
+
+
+def _digest(grammar: str) -> str:
+    return hashlib.sha256(grammar.encode()).hexdigest()[:24]
 
 
 def compute(grammar: str) -> Tables:
@@ -114,37 +123,3 @@ def _action(rule: Any) -> str | None:
     if rule.alias:
         return str(rule.alias)
     return None if len(rule.expansion) == 1 else str(rule.origin.name)
-
-
-def _read(path: Path) -> Tables | None:
-    """The cached tables; None if there are none, or none that can be trusted to be whole."""
-    try:
-        data = json.loads(path.read_text(encoding="utf-8"))
-        rules = tuple(Rule(origin, size, action) for origin, size, action in data["rules"])
-        rows = tuple(data["rows"])
-        starts, ends = data["starts"], data["ends"]
-    except (OSError, ValueError, KeyError, TypeError):
-        return None
-    return Tables(rules, rows, starts, ends)
-
-
-def _write(path: Path, computed: Tables) -> None:
-    """Write the cache in one step. That it can't be written (a read-only home) costs time, nothing else."""
-    data = {
-        "rules": [[rule.origin, rule.size, rule.action] for rule in computed.rules],
-        "rows": computed.rows,
-        "starts": computed.starts,
-        "ends": computed.ends,
-    }
-    import tempfile
-
-    temporary = None
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=".grammar-", suffix=".tmp")
-        with os.fdopen(handle, "w", encoding="utf-8") as file:
-            json.dump(data, file, separators=(",", ":"))
-        os.replace(temporary, path)
-    except OSError:
-        if temporary is not None and os.path.exists(temporary):
-            os.unlink(temporary)

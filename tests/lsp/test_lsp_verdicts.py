@@ -17,7 +17,6 @@ from potto_lsp.uris import to_uri
 from potto_lsp.verdicts import FOLDER, Verdicts, program_digest
 
 from potto.reports.render import Located
-from potto.syntax.tables import tables
 
 PUSHED = "textDocument/publishDiagnostics"
 LIB = "def step(u) [u > 0]\n"
@@ -27,7 +26,6 @@ MAIN = "from lib import step\nfrom lib import nothing\ndef f(t) integral [0, 1] 
 @pytest.fixture
 def cache(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """A cache folder of its own, in which verdicts are."""
-    tables()
     folder = tmp_path_factory.mktemp("cache")
     monkeypatch.setenv("POTTO_CACHE", str(folder))
     yield folder / f"{FOLDER}{program_digest()}"
