@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from potto.integrate.fixed.product_rule import CANCELS, FEW, Rule
-from potto.integrate.fixed.straight import MOST_CUTS, Straight
+from potto.integrate.fixed.straight import ROW_BITS, Straight
 from potto.integrate.fixed.topologies import Alike, topologies
 from potto.integrate.pieces import Evaluator, Sums, added_up, gather, together
 from potto.kernels.cells import Array, Bools, Cell, Ints, Value
@@ -32,10 +32,6 @@ ENOUGH = 0.9
 # What rounding may leave where what is added up cancels, as a part of that, in the end (`convergence`): of 18,233 pairs
 # of a triangle and a pixel 1,082 would be done again for less, at a hundred times the cost.
 ROUNDED = 1e-12
-
-
-# Enough for the number of a row in a frame: two bounds, then cuts.
-ROW_BITS = (MOST_CUTS + 1).bit_length()
 
 
 def by_shapes(

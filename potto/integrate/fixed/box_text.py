@@ -14,7 +14,8 @@ from functools import reduce
 from msgspec import Struct
 
 from potto.core.terms import Lam, Term, Tuple, children, function_of
-from potto.integrate.fixed.rule_text import Place, RuleText, Symbol, still
+from potto.integrate.fixed.formula_text import Place, Symbol, still
+from potto.integrate.fixed.rule_text import RuleText
 from potto.integrate.fixed.straight import Straight
 from potto.integrate.pieces import Evaluator
 from potto.integrate.rules.gauss import EPS, gauss
@@ -70,10 +71,10 @@ class BoxText(RuleText):
 
     def text(self, places: Sequence[Place]) -> str:
         at, each = self.at, self.channels
-        self.begin(places)
+        self.begin()
         self.added = [at.room(n * each) for n in self.orders]
         self.most = [at.room(1) for _ in range(each)]
-        here, columns = self.parameters(places, int(self.look.known))
+        here, columns = self.parameters(places, self.columns, int(self.look.known))
         ends = self.evaluated(self.look.bounds, here, self.machine)
         if any(end.e is not None or any(x is not None for x in end.t) for end in ends):
             raise NotStraight("bounds that move have boundary terms of their own")

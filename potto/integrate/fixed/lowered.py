@@ -17,7 +17,8 @@ from msgspec import Struct, field
 
 from potto.core.terms import Term
 from potto.integrate.fixed.axes import Axis, Raw
-from potto.integrate.fixed.rule_text import NAME, ONE, Place, RuleText
+from potto.integrate.fixed.formula_text import ONE, Place
+from potto.integrate.fixed.rule_text import NAME, RuleText
 from potto.integrate.fixed.straight import Straight
 from potto.integrate.pieces import Evaluator
 from potto.kernels.cells import Array, Cell, Ints, Value
@@ -50,10 +51,11 @@ class LoweredCells(Struct, frozen=True):
         """The sums over cells. members: (M,), whose they are; rows: (variables, 2, M), of the frames, between which."""
         k1, count = 1 + directions, members.size
         numbers, arrays = given(self.places, env)
-        taken = [array.take(members) for array in arrays] + [ends.astype(float) for pair in rows for ends in pair]
+        ends = [row.astype(float) for pair in rows for row in pair]
         sizes = [3 * k1 + 3, *(axis.transform.shape[1] * k1 for axis in axes)]
         out = np.empty((sum(sizes), max(count, LANES)))
-        columns = [whole(column, out.shape[1]) for column in taken]
+        columns = [whole(column, out.shape[1]) for column in (members, *ends)]
+        columns[1:1] = map(np.ascontiguousarray, arrays)
         frame = frame_of(out, axes, columns)
         function.call(address(frame), address(numbers))
         counts.native_points += count * math.prod(len(axis.nodes) for axis in axes)
@@ -84,6 +86,12 @@ def frame_of(out: Array, axes: Sequence[Axis], columns: Sequence[Array]) -> Ints
 def whole(column: Array, least: int) -> Array:
     """A column as a function reads it, of LANES numbers at least."""
     return np.ascontiguousarray(column) if column.size >= least else np.resize(column, least)
+
+
+def parts(count: int, most: int) -> list[tuple[int, int]]:
+    """First and last of parts of about so many members, none with fewer than LANES."""
+    starts = list(range(0, max(count - LANES, 0) + 1, most))
+    return list(zip(starts, [*starts[1:], count], strict=True))
 
 
 def given(places: Iterable[Place], env: Mapping[str, Value]) -> tuple[Array, list[Array]]:

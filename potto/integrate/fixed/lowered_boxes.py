@@ -14,8 +14,9 @@ from msgspec import Struct, field
 
 from potto.integrate.fixed.axes import Axis
 from potto.integrate.fixed.box_text import CROSSED, DARK, DONE, LEFT, BoxText, Look, numbers, rows_of
-from potto.integrate.fixed.lowered import frame_of, given, whole
-from potto.integrate.fixed.rule_text import NAME, Place
+from potto.integrate.fixed.formula_text import Place
+from potto.integrate.fixed.lowered import frame_of, given, parts, whole
+from potto.integrate.fixed.rule_text import NAME
 from potto.integrate.pieces import Evaluator, Sums
 from potto.kernels.cells import Array, Bools, Ints, Value
 from potto.kernels.making import counts
@@ -77,7 +78,7 @@ class LoweredBoxes(Struct, frozen=True):
         least = max(batch, LANES)
         out = np.empty((rows_of(m * k1), least))
         columns = [whole(column, least) for column in (*arrays, *sides)]
-        for start, stop in _parts(least):
+        for start, stop in parts(least, AT_ONCE):
             frame = frame_of(out[:, start:stop], axes, [column[start:stop] for column in columns])
             function.call(address(frame), address(constants))
         found = out[:, :batch]
@@ -87,9 +88,3 @@ class LoweredBoxes(Struct, frozen=True):
         counts.native_points += evaluations
         total, bound = found[: 2 * m * k1].reshape(2, m, k1, batch)
         return Passed(Sums(total[:, 0], bound[:, 0], total[:, 1:], bound[:, 1:], gross=found[-3:-1]), state)
-
-
-def _parts(count: int) -> list[tuple[int, int]]:
-    """First and last of parts, none with fewer than LANES members."""
-    starts = list(range(0, max(count - LANES, 0) + 1, AT_ONCE))
-    return list(zip(starts, [*starts[1:], count], strict=True))

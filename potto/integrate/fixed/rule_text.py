@@ -7,79 +7,46 @@ outermost loop in which all that it needs is known.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
-from msgspec import Struct
 
-from potto.core.terms import Lam, Term, function_of
+from potto.core.terms import Term, function_of
 from potto.integrate.fixed.edges import EDGE, edges_of
+from potto.integrate.fixed.formula_text import Dual, Env, FormulaText, Place, Symbol, still
 from potto.integrate.fixed.straight import Straight
 from potto.integrate.pieces import Evaluator
 from potto.integrate.rules.gauss import EPS
 from potto.kernels.native.elementary import module
-from potto.kernels.native.straight import NotStraight, Packed, Part, needed, packed
-from potto.kernels.native.straight import Straight as Lines
-from potto.kernels.native.vectors import LANES, Vectors
 
 NAME = "rule"
-ONE = "1.0"
 # Numbers of the frame: how many members, how long the rows of results are, and where; for each variable how many nodes,
 # coefficients and nodes with rounding, then where tables are.
 HEAD, PER_AXIS = 3, 9
 
 
-class Place(Struct, frozen=True):
-    """A part of a parameter, and what is there: an "array", a "number" for all members, or ONE."""
+class RuleText(FormulaText):
+    """Writes the function. Lists of 1 + k names have a value first, then its tangents.
 
-    name: str
-    part: Part
-    kind: str
-
-
-class Symbol(Struct, frozen=True):
-    """A cell whose parts are names of vectors; None where a part is 0, ONE where a tangent is 1."""
-
-    v: str
-    e: str | None
-    t: tuple[str | None, ...]
-    et: tuple[str | None, ...]
-
-    def pattern(self) -> Any:
-        moving = tuple(0 if x is None else 1 if x == ONE else 2 for x in self.t)
-        return self.e is not None or any(x is not None for x in self.et), moving
-
-    def part(self, part: Part) -> str | None:
-        if part.kind in ("v", "e"):
-            return self.v if part.kind == "v" else self.e
-        return (self.t if part.kind == "t" else self.et)[part.direction]
-
-
-Dual = list[str | None]
-Env = dict[str, Symbol]
-
-
-class RuleText:
-    """Writes the function. Lists of 1 + k names have a value first, then its tangents. reserved: of the constants, how
-    many come before parameters."""
-
-    reserved = 0
+    Behind the tables the frame tells whose cells they are, then where the columns are: those of parameters, a number
+    for every member, and the rows of the ends of cells.
+    """
 
     def __init__(self, plan: Straight, face: Term, machine: Evaluator) -> None:
-        self.plan, self.machine = plan, machine
+        super().__init__(machine)
+        self.plan = plan
         self.face, self.edges = function_of(face), [function_of(edge) for edge in edges_of(face)]
-        self.at = Vectors()
-        self.channels = self.k1 = 1 + machine.directions
-        self.zero, self.one = self.at.number(0.0), self.at.number(1.0)
+        self.channels = self.k1
 
     def text(self, places: Sequence[Place]) -> str:
         at, k1 = self.at, self.k1
-        self.begin(places)
+        self.begin()
         self.added = [at.room(at.whole("mul", table[1], k1)) for table in self.tables]
         clear, corners, largest = at.room(1), at.room(1), at.room(1)
         self.clear = clear
-        here, rows = self.parameters(places, 2 * len(self.plan.variables))
+        start = self.columns
+        members = at.wholes(at.at(at.address("%frame", start, "ptr"), self.first, "i64"))
+        here, rows = self.parameters(places, start + 1, 2 * len(self.plan.variables), members)
         self.rows = list(zip(rows[::2], rows[1::2], strict=True))
         at.store(self.one, clear)
         at.store(self.zero, corners)
@@ -100,45 +67,19 @@ class RuleText:
 
     # Columns of numbers
 
-    def begin(self, places: Sequence[Place]) -> None:
-        """Begin the loop over the members, eight at a time; the last ones are done twice."""
+    @property
+    def columns(self) -> int:
+        """Where the frame tells the columns."""
+        return HEAD + PER_AXIS * len(self.plan.variables)
+
+    def begin(self) -> None:
+        """Begin the loop over cells, with what the frame tells."""
         at, count = self.at, len(self.plan.variables)
-        self.count, self.length = at.address("%frame", 0), at.address("%frame", 1)
-        self.out = at.address("%frame", 2, "ptr")
+        self.length, self.out = at.address("%frame", 1), at.address("%frame", 2, "ptr")
         self.tables = [[at.address("%frame", HEAD + PER_AXIS * i + j, "i64" if j < 3 else "ptr")
                         for j in range(PER_AXIS)] for i in range(count)]  # fmt: skip
         self.sums = [at.room(at.whole("mul", table[1], self.channels)) for table in self.tables]
-        last = at.whole("sub", self.count, LANES)
-        blocks = at.whole("udiv", at.whole("add", self.count, LANES - 1), LANES)
-        first = at.whole("mul", at.begin(blocks), LANES)
-        self.first = at.once(f"call i64 @llvm.umin.i64(i64 {first}, i64 {last})", first)
-
-    def parameters(self, places: Sequence[Place], more: int) -> tuple[Env, list[str]]:
-        """The parameters of the members of a block, and so many columns more."""
-        at, start = self.at, HEAD + PER_AXIS * len(self.plan.variables)
-        known: dict[tuple[str, Part], str] = {}
-        arrays = [place for place in places if place.kind == "array"]
-        numbers = [place for place in places if place.kind == "number"]
-        columns = [at.load(at.at(at.address("%frame", start + i, "ptr"), self.first, "double"))
-                   for i in range(len(arrays) + more)]  # fmt: skip
-        for place, column in zip(arrays, columns, strict=False):
-            known[place.name, place.part] = column
-        for i, place in enumerate(numbers):
-            known[place.name, place.part] = at.constant("%constants", self.reserved + i)
-        for place in places:
-            if place.kind == ONE:
-                known[place.name, place.part] = ONE
-
-        def parts(name: str, kind: str) -> tuple[str | None, ...]:
-            return tuple(known.get((name, Part((), kind, d))) for d in range(self.k1 - 1))
-
-        names = dict.fromkeys(place.name for place in places)
-        return {
-            name: Symbol(
-                known[name, Part((), "v")], known.get((name, Part((), "e"))), parts(name, "t"), parts(name, "et")
-            )
-            for name in names
-        }, columns[len(arrays) :]
+        self.block()
 
     def told(self, values: Sequence[str | None], each: int) -> None:
         """Put rows of results: these, then of each variable so many for each of its coefficients."""
@@ -316,70 +257,9 @@ class RuleText:
             None if moves is None else error for moves, error in zip(at[1:], errors, strict=True)
         ))  # fmt: skip
 
-    def evaluated(self, function: Lam, env: Env, machine: Evaluator) -> list[Symbol]:
-        """The numbers of a function to a number or a tuple of them."""
-        args = [env[name] for name in function.params]
-        kernel = machine.kernel(function, tuple(arg.pattern() for arg in args))
-        if not kernel.plain:
-            raise NotStraight(kernel.text)
-        lines = Lines.of(kernel)
-        known = {}
-        for name, part in lines.parts.items():
-            known[name] = self.plain(args[part.path[0]].part(part)) or self.zero
-        cells = list(packed(lines.result))
-        wanted = {name for cell in cells for name in cell.parts()}
-        found = self.at.run(needed(lines.operations(), wanted), known)
-        return [self.symbol(cell, found) for cell in cells]
-
-    def symbol(self, cell: Packed, found: Mapping[str, str]) -> Symbol:
-        def part(name: str | None) -> str | None:
-            return None if name is None else found.get(name) or self.at.number(float(name))
-
-        value = part(cell.v)
-        assert value is not None
-        return Symbol(value, part(cell.e), tuple(map(part, cell.t)), tuple(map(part, cell.et)))
-
-    # Arithmetic of what may be 0
-
-    def plain(self, x: str | None) -> str | None:
-        return self.one if x == ONE else x
-
-    def size(self, x: str | None) -> str | None:
-        return None if x is None else self.at.apply("abs", x)
-
-    def times(self, x: str | None, y: str | None) -> str | None:
-        return None if x is None or y is None else self.at.apply("mul", x, y)
-
-    def total(self, *terms: str | None) -> str | None:
-        result = None
-        for term in terms:
-            if term is not None:
-                result = term if result is None else self.at.apply("add", result, term)
-        return result
-
-    def product(self, f: Dual, g: Dual) -> Dual:
-        """(f g)' = f' g + f g'."""
-        moved = [self.total(self.times(x, g[0]), self.times(f[0], y)) for x, y in zip(f[1:], g[1:], strict=True)]
-        return [self.times(f[0], g[0]), *moved]
-
-    # Memory
-
-    def fill(self, memory: str, rows: str, each: int) -> None:
-        i = self.at.begin(self.at.whole("mul", rows, each))
-        self.at.store(self.zero, self.at.at(memory, i))
-        self.at.end()
-
-    def raise_to(self, place: str, value: str) -> None:
-        self.at.store(self.at.apply("max", self.at.load(place), value), place)
-
     def finite(self, size: str) -> str:
         return self.at.apply("select", self.at.apply("lt", size, self.at.number(np.inf)), size, self.zero)
 
     def only(self, mask: str) -> None:
         """Members for which the mask doesn't hold are not clear."""
         self.at.store(self.at.apply("select", mask, self.at.load(self.clear), self.zero), self.clear)
-
-
-def still(symbol: Symbol) -> Symbol:
-    """A cell without tangents."""
-    return Symbol(symbol.v, None, (), ())

@@ -29,6 +29,8 @@ from potto.integrate.levels import LevelPlan
 from potto.integrate.rules.complex_enclosures import enclosable
 
 MOST_VARIABLES, MOST_CUTS, MOST_TERMS = 3, 13, 600
+# Enough for the number of a row in a frame: two bounds, then cuts.
+ROW_BITS = (MOST_CUTS + 1).bit_length()
 # How many times its rounding a surface must be away from 0, and cuts from each other.
 CLEAR = 64.0
 

@@ -16,12 +16,14 @@ from msgspec import Struct
 
 from potto.core.terms import Const, Term, children
 from potto.integrate.columns import distinct
-from potto.integrate.fixed.lowered_order import FARTHEST, by_numpy, sorted_rows
+from potto.integrate.fixed.lowered_topologies import Found, lowered_topologies
 from potto.integrate.fixed.moving_sums import evaluated
 from potto.integrate.fixed.straight import CLEAR, Straight
+from potto.integrate.fixed.topology_text import FARTHEST
 from potto.integrate.pieces import Evaluator, gather
 from potto.kernels.cells import Array, Bools, Cell, Ints, Number, Value
 
+LEAST = 64  # members, below which machine code takes longer to be called than numpy
 FEW = 16  # numbers, up to which comparing with each of them takes less time than looking them up
 Turning = tuple[tuple[bool, bool], ...]
 
@@ -56,14 +58,33 @@ def topologies(plan: Straight, machine: Evaluator, env: dict[str, Value], batch:
     """Which members are plain, and all cells of these, by what is integrated over them."""
     moving = machine.costs is not None  # then it is told how surfaces move
     tracking = (machine if moving else machine.with_directions(0)).tracking()
-    plain = np.ones(batch, dtype=bool)
     here = {name: _spread(env[name], batch, moving) for name in plan.names}
+    if moving or batch < LEAST:
+        found = _found(plan, tracking, here, batch)
+    else:
+        found = _by_either(plan, tracking, env, here, batch)
+    return found.plain, _gathered(plan, machine, found)
+
+
+def _by_either(plan: Straight, machine: Evaluator, env: dict[str, Value], here: dict[str, Value], batch: int) -> Found:
+    """By machine code, if that is to be used now, or by numpy."""
+    way = lowered_topologies(plan, {name: Cell(cell.v, cell.e) for name, cell in env.items() if isinstance(cell, Cell)})
+    function = way.function(machine)
+    if function is not None:
+        return way.run(function, env, batch)
+    with way.promotion.by_numpy():
+        return _found(plan, machine, here, batch)
+
+
+def _found(plan: Straight, machine: Evaluator, here: dict[str, Value], batch: int) -> Found:
+    """All cells of plain members, by numpy: for one variable after the other, those of all members at once."""
+    plain = np.ones(batch, dtype=bool)
     cells = _Cells(np.empty((0, 2, batch), dtype=np.int64), np.arange(batch), here)
     for i in range(len(plan.variables)):
-        cells = _along(plan, i, tracking, cells, plain)
-    sides = _sides(plan, tracking, cells, plain)
-    kept = np.nonzero(plain[cells.members])[0]
-    return plain, _gathered(plan, machine, cells.pick(kept, ()), sides[kept])
+        cells = _along(plan, i, machine, cells, plain)
+    sides = _sides(plan, machine, cells, plain)
+    kept = np.flatnonzero(plain.take(cells.members))
+    return Found(plain, cells.rows.take(kept, -1), cells.members.take(kept), sides.take(kept))
 
 
 def _along(plan: Straight, i: int, machine: Evaluator, cells: _Cells, plain: Bools) -> _Cells:
@@ -75,7 +96,7 @@ def _along(plan: Straight, i: int, machine: Evaluator, cells: _Cells, plain: Boo
         for surface, rows in plan.jumps[i]:
             roots = [(values[row].v, values[row].t) for row in rows]
             machine.costs.saw(surface, roots, places[0], places[1], machine.directions > 0)
-    order, count, fine = in_order(places, off, machine.backend)
+    order, count, fine = in_order(places, off)
     plain[cells.members[~fine]] = False
     size, flat = places.shape[1], places.reshape(-1)
     found = [np.flatnonzero((at < count) & fine) for at in range(1, len(places))]
@@ -101,10 +122,10 @@ def _sides(plan: Straight, machine: Evaluator, cells: _Cells, plain: Bools) -> I
     return codes
 
 
-def _gathered(plan: Straight, machine: Evaluator, cells: _Cells, sides: Ints) -> list[Alike]:
+def _gathered(plan: Straight, machine: Evaluator, cells: Found) -> list[Alike]:
     """The cells by what is integrated over them, which several combinations of sides may lead to (of a union each but
     one), and by which ends of their stretches are like square roots."""
-    count, found = len(plan.variables), []
+    count, found, sides = len(plan.variables), [], cells.sides
     turns = np.zeros(cells.members.size, dtype=np.int64)
     for i, turning in enumerate(plan.turning):
         if turning:
@@ -145,19 +166,11 @@ def _rows(values: tuple[Cell, ...], count: int) -> tuple[Array, Array]:
     return places, off
 
 
-def in_order(places: Array, off: Array, backend: str) -> tuple[Ints, Ints, Bools]:
+def in_order(places: Array, off: Array) -> tuple[Ints, Ints, Bools]:
     """Per member its rows in order, (R, M), how many of them lie between the bounds, these included, and for whom that
     is sure. A row that is not a number is a root that is not there.
     """
     near = CLEAR * off
-    found = sorted_rows(places, near, backend)
-    if found is not None:
-        return found[0].astype(np.int64), found[1].astype(np.int64), found[2] > 0
-    with by_numpy(len(places)).by_numpy():
-        return _in_order(places, near)
-
-
-def _in_order(places: Array, near: Array) -> tuple[Ints, Ints, Bools]:
     lying = (places >= places[0] - near[0] - near) & (places <= places[1] + near[1] + near)
     lying[:2] = True
     key = np.where(lying, np.minimum(places, FARTHEST), np.inf)

@@ -13,9 +13,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping
 
-from potto.kernels.native.vectors import LANES, LIBRARY, MASK, NUMBER, Vectors, bits, intrinsics
+from potto.kernels.native.vectors import LANES, LIBRARY, MASK, NUMBER, WHOLE, Vectors, bits, intrinsics
 
-WHOLE = f"<{LANES} x i64>"
 # Added to a number below 2^51, it leaves the nearest whole number in the last bits.
 MAGIC = 1.5 * 2.0**52
 _MAGIC_BITS = 0x4338000000000000
@@ -161,6 +160,8 @@ def module(at: Vectors, name: str, parameters: str) -> str:
     """A module with the function that lines are, and all that it calls."""
     (body,) = at.bodies
     texts = [text for code in at.used for text in _function(code)]
+    if any("@gather(" in line for line in body):
+        texts.append(_gather())
     texts.append("\n".join([f"define void @{name}({parameters}) {{", "entry:", *body, "  ret void", "}"]))
     whole = "\n".join(texts)
     return "\n".join([intrinsics(whole), whole, ""])
@@ -183,6 +184,20 @@ def _function(code: str) -> list[str]:
         f"all:\n  %fast = call {NUMBER} @near_{code}({NUMBER} %x0)\n  ret {NUMBER} %fast\n}}"
     )
     return [declared, _one_by_one(code, f"library_{code}", 1), _ours(code, f"near_{code}"), far]
+
+
+def _gather() -> str:
+    lines, found = [], "poison"
+    for i in range(LANES):
+        lines += [
+            f"  %i{i} = extractelement {WHOLE} %index, i64 {i}",
+            f"  %p{i} = getelementptr double, ptr %memory, i64 %i{i}",
+            f"  %x{i} = load double, ptr %p{i}, align 8",
+            f"  %v{i} = insertelement {NUMBER} {found}, double %x{i}, i64 {i}",
+        ]
+        found = f"%v{i}"
+    head = f"define internal {NUMBER} @gather(ptr %memory, {WHOLE} %index) {{"
+    return "\n".join([head, *lines, f"  ret {NUMBER} {found}", "}"])
 
 
 def _ours(code: str, name: str) -> str:

@@ -29,7 +29,6 @@ _numbers = itertools.count()
 
 
 @lru_cache(maxsize=1)
-@lru_cache(maxsize=1)
 def available() -> bool:
     """Whether machine code can be made here."""
     return find_spec("llvmlite") is not None

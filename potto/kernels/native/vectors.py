@@ -13,7 +13,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from potto.kernels.native.straight import NotStraight, Operation
 
 LANES = 8
-NUMBER, MASK = f"<{LANES} x double>", f"<{LANES} x i1>"
+NUMBER, WHOLE, MASK = (f"<{LANES} x {kind}>" for kind in ("double", "i64", "i1"))
 ARITHMETIC = {"add": "fadd", "sub": "fsub", "mul": "fmul", "div": "fdiv"}
 RELATIONS = {"lt": "olt", "le": "ole", "gt": "ogt", "ge": "oge", "eq": "oeq", "ne": "une"}
 INTRINSICS = {"sqrt": 1, "floor": 1, "ceil": 1, "abs": 1, "min": 2, "max": 2}
@@ -121,8 +121,27 @@ class Vectors:
     def load(self, place: str) -> str:
         return self.let(f"load {NUMBER}, ptr {place}, align 8")
 
+    def wholes(self, place: str) -> str:
+        """Whole numbers, read as such."""
+        return self.let(f"load {WHOLE}, ptr {place}, align 8")
+
+    def gather(self, memory: str, index: str) -> str:
+        """Numbers from these places of memory."""
+        return self.let(f"call {NUMBER} @gather(ptr {memory}, {WHOLE} {index})")
+
     def store(self, value: str, place: str) -> None:
         self.line(f"store {NUMBER} {value}, ptr {place}, align 8")
+
+    def store_wholes(self, value: str, place: str) -> None:
+        """Put numbers as whole numbers."""
+        self.line(f"store {WHOLE} {self.once(f'fptosi {NUMBER} {value} to {WHOLE}', value)}, ptr {place}, align 8")
+
+    def count_up(self, memory: str, index: int, by: int) -> str:
+        """A whole number of a table before so much is added to it."""
+        place = self.at(memory, index, "i64")
+        found = self.let(f"load i64, ptr {place}")
+        self.line(f"store i64 {self.whole('add', found, by)}, ptr {place}")
+        return found
 
     def constant(self, memory: str, index: str | int) -> str:
         """A number of a table that never changes, at all places."""

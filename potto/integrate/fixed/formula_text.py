@@ -1,0 +1,169 @@
+"""Formulas of the parameters of many members, as LLVM reads them: eight members at a time.
+
+Owns `FormulaText`, on which the texts of product rules, of boxes and of topologies are built, and `Place` and `Symbol`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from msgspec import Struct
+
+from potto.core.terms import Lam
+from potto.integrate.pieces import Evaluator
+from potto.kernels.native.straight import NotStraight, Packed, Part, needed, packed
+from potto.kernels.native.straight import Straight as Lines
+from potto.kernels.native.vectors import LANES, Vectors
+
+ONE = "1.0"
+
+
+class Place(Struct, frozen=True):
+    """A part of a parameter, and what is there: an "array", a "number" for all members, or ONE."""
+
+    name: str
+    part: Part
+    kind: str
+
+
+class Symbol(Struct, frozen=True):
+    """A cell whose parts are names of vectors; None where a part is 0, ONE where a tangent is 1."""
+
+    v: str
+    e: str | None
+    t: tuple[str | None, ...]
+    et: tuple[str | None, ...]
+
+    def pattern(self) -> Any:
+        moving = tuple(0 if x is None else 1 if x == ONE else 2 for x in self.t)
+        return self.e is not None or any(x is not None for x in self.et), moving
+
+    def part(self, part: Part) -> str | None:
+        if part.kind in ("v", "e"):
+            return self.v if part.kind == "v" else self.e
+        return (self.t if part.kind == "t" else self.et)[part.direction]
+
+
+Dual = list[str | None]
+Env = dict[str, Symbol]
+
+
+class FormulaText:
+    """Writes loops over members, and in them the numbers of functions. reserved: of the constants, how many come before
+    parameters."""
+
+    reserved = 0
+
+    def __init__(self, machine: Evaluator) -> None:
+        self.machine, self.at = machine, Vectors()
+        self.k1 = 1 + machine.directions
+        self.zero, self.one = self.at.number(0.0), self.at.number(1.0)
+
+    # Members
+
+    def block(self) -> None:
+        """Begin the loop over the members, eight at a time; the last ones are done twice."""
+        at = self.at
+        self.count = at.address("%frame", 0)
+        last = at.whole("sub", self.count, LANES)
+        blocks = at.whole("udiv", at.whole("add", self.count, LANES - 1), LANES)
+        self.number = at.whole("mul", at.begin(blocks), LANES)
+        self.first = at.once(f"call i64 @llvm.umin.i64(i64 {self.number}, i64 {last})", self.number)
+
+    def parameters(
+        self, places: Sequence[Place], start: int, more: int = 0, members: str | None = None
+    ) -> tuple[Env, list[str]]:
+        """The parameters of the members of a block, and so many columns more. start: where the frame tells columns.
+        members: whose parameters are asked for, where they are not those of the block."""
+        at, known = self.at, dict[tuple[str, Part], str]()
+        slots = iter(range(start, start + len(places) + more))
+        numbers = iter(range(self.reserved, self.reserved + len(places)))
+
+        def column(members: str | None) -> str:
+            place = at.address("%frame", next(slots), "ptr")
+            return at.gather(place, members) if members else at.load(at.at(place, self.first, "double"))
+
+        for place in places:
+            match place.kind:
+                case "array":
+                    found = column(members)
+                case "number":
+                    found = at.constant("%constants", next(numbers))
+                case _:
+                    found = ONE
+            known[place.name, place.part] = found
+
+        def parts(name: str, kind: str) -> tuple[str | None, ...]:
+            return tuple(known.get((name, Part((), kind, d))) for d in range(self.k1 - 1))
+
+        names = dict.fromkeys(place.name for place in places)
+        return {
+            name: Symbol(
+                known[name, Part((), "v")], known.get((name, Part((), "e"))), parts(name, "t"), parts(name, "et")
+            )
+            for name in names
+        }, [column(None) for _ in range(more)]
+
+    # Formulas
+
+    def evaluated(self, function: Lam, env: Env, machine: Evaluator) -> list[Symbol]:
+        """The numbers of a function to a number or a tuple of them."""
+        args = [env[name] for name in function.params]
+        kernel = machine.kernel(function, tuple(arg.pattern() for arg in args))
+        if not kernel.plain:
+            raise NotStraight(kernel.text)
+        lines = Lines.of(kernel)
+        known = {}
+        for name, part in lines.parts.items():
+            known[name] = self.plain(args[part.path[0]].part(part)) or self.zero
+        cells = list(packed(lines.result))
+        wanted = {name for cell in cells for name in cell.parts()}
+        found = self.at.run(needed(lines.operations(), wanted), known)
+        return [self.symbol(cell, found) for cell in cells]
+
+    def symbol(self, cell: Packed, found: Mapping[str, str]) -> Symbol:
+        def part(name: str | None) -> str | None:
+            return None if name is None else found.get(name) or self.at.number(float(name))
+
+        value = part(cell.v)
+        assert value is not None
+        return Symbol(value, part(cell.e), tuple(map(part, cell.t)), tuple(map(part, cell.et)))
+
+    # Arithmetic of what may be 0
+
+    def plain(self, x: str | None) -> str | None:
+        return self.one if x == ONE else x
+
+    def size(self, x: str | None) -> str | None:
+        return None if x is None else self.at.apply("abs", x)
+
+    def times(self, x: str | None, y: str | None) -> str | None:
+        return None if x is None or y is None else self.at.apply("mul", x, y)
+
+    def total(self, *terms: str | None) -> str | None:
+        result = None
+        for term in terms:
+            if term is not None:
+                result = term if result is None else self.at.apply("add", result, term)
+        return result
+
+    def product(self, f: Dual, g: Dual) -> Dual:
+        """(f g)' = f' g + f g'."""
+        moved = [self.total(self.times(x, g[0]), self.times(f[0], y)) for x, y in zip(f[1:], g[1:], strict=True)]
+        return [self.times(f[0], g[0]), *moved]
+
+    # Memory
+
+    def fill(self, memory: str, rows: str, each: int) -> None:
+        i = self.at.begin(self.at.whole("mul", rows, each))
+        self.at.store(self.zero, self.at.at(memory, i))
+        self.at.end()
+
+    def raise_to(self, place: str, value: str) -> None:
+        self.at.store(self.at.apply("max", self.at.load(place), value), place)
+
+
+def still(symbol: Symbol) -> Symbol:
+    """A cell without tangents."""
+    return Symbol(symbol.v, None, (), ())

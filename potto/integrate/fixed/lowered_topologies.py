@@ -1,0 +1,90 @@
+"""The cells of many members by machine code: what `topologies` does by numpy, as one function.
+
+Owns `LoweredTopologies`, `Found` and `lowered_topologies`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+from msgspec import Struct, field
+
+from potto.integrate.fixed.formula_text import Place
+from potto.integrate.fixed.lowered import given, parts, places_of, whole
+from potto.integrate.fixed.straight import ROW_BITS, Straight
+from potto.integrate.fixed.topology_text import FOUND, NAME, TopologyText
+from potto.integrate.pieces import Evaluator
+from potto.kernels.cells import Bools, Ints, Value
+from potto.kernels.native.objects import Loaded
+from potto.kernels.native.points import address
+from potto.kernels.native.promotion import Promotion
+from potto.kernels.native.vectors import LANES
+
+# Members at once, and cells for which there is room: few enough to stay in the cache.
+AT_ONCE, ROOM = 1 << 11, 1 << 16
+
+
+class Found(Struct, frozen=True):
+    """Which members are plain (B,), and the cells of these: rows (variables, 2, N) between which they lie, whose they
+    are (N,), and the sides of the surfaces in their middles, as numbers with a bit for each (N,)."""
+
+    plain: Bools
+    rows: Ints
+    members: Ints
+    sides: Ints
+
+
+class LoweredTopologies(Struct, frozen=True):
+    """The function for parameters with these parts."""
+
+    plan: Straight
+    places: tuple[Place, ...]
+    promotion: Promotion = field(default_factory=lambda: Promotion(NAME))
+
+    def function(self, machine: Evaluator) -> Loaded | None:
+        """The function, if it is to be used now. machine: one that keeps track of rounding, without directions."""
+        return self.promotion.function(machine.backend, lambda: TopologyText(self.plan, machine).text(self.places))
+
+    @property
+    def most(self) -> int:
+        """How many cells a member may have."""
+        return math.prod(len(items) - 1 for items in self.plan.items)
+
+    def run(self, function: Loaded, env: Mapping[str, Value], batch: int) -> Found:
+        """The cells of a batch."""
+        constants, arrays = given(self.places, env)
+        count = max(batch, LANES)
+        columns, plain = [whole(column, count) for column in arrays], np.empty(count)
+        step, found = max(LANES, min(AT_ONCE, ROOM // self.most // LANES * LANES)), []
+        room = np.empty((3, self.most * (step + 2 * LANES)), dtype=np.int64)
+        for start, stop in parts(count, step):
+            into = (plain[start:stop], *room, *(column[start:stop] for column in columns))
+            frame = np.array([stop - start, min(stop, batch) - start, 0, *map(address, into)], dtype=np.int64)
+            function.call(address(frame), address(constants))
+            cells = room[:, : frame[FOUND]]
+            cells = cells.compress(cells[2] >= 0, 1)
+            cells[0] += start
+            found.append(cells)
+        members, between, sides = np.concatenate(found, axis=1)
+        fine: Bools = np.asarray(plain[:batch] > 0)
+        if not fine.all():
+            kept = fine.take(members)
+            members, between, sides = members[kept], between[kept], sides[kept]
+        return Found(fine, self.rows(between), members, sides)
+
+    def rows(self, between: Ints) -> Ints:
+        """The rows that such a number tells."""
+        ends = 2 * len(self.plan.variables)
+        digits = [between >> ROW_BITS * (ends - 1 - n) & (1 << ROW_BITS) - 1 for n in range(ends)]
+        return np.array(digits).reshape(ends // 2, 2, -1)
+
+
+def lowered_topologies(plan: Straight, env: Mapping[str, Value]) -> LoweredTopologies:
+    """The function for an environment whose numbers have these parts."""
+    places = places_of(plan.names, env)
+    found: LoweredTopologies | None = plan.lowered.get(places)
+    if found is None:
+        found = plan.lowered[places] = LoweredTopologies(plan, places)
+    return found

@@ -1,0 +1,82 @@
+"""The cells of many members that machine code finds are those that numpy finds.
+
+Both compare, subtract and bound the rounding of the same doubles, so that they agree about every cell and about who is
+plain; cuts repeat, lie on bounds, or are no numbers (roots that are not there). Where one may be anywhere nothing is
+sure.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import potto
+from potto.integrate.fixed import topologies as module
+from potto.integrate.fixed.lowered_topologies import Found, LoweredTopologies
+from potto.integrate.fixed.topologies import in_order
+
+pytest.importorskip("llvmlite")
+
+PROGRAMS = {
+    "one variable": "def f(a, b, c) integral [0, 1] (x + c)*[x > a]*[x < b] d(x)",
+    "lines": "def f(a, b, c) integral ([0, 1], [0, 1]) [x + y > a] + [x - 2*y > b]*[x > c] d(x, y)",
+    "a circle": "def f(a, b, c) integral ([a, 1], [b, 1]) [x^2 + y^2 < c^2 + 0.25] d(x, y)",
+    "moving bounds": "def f(a, b, c) integral ([a, b + 2], [0, c + 2]) x*[y > x*a] d(x, y)",
+    "three variables": "def f(a, b, c) integral ([0, 1], [0, 1], [0, 1]) [x + y + z > a]*[x > b] d(x, y, z)",
+}
+
+
+@pytest.mark.parametrize("program", list(PROGRAMS))
+def test_cells_are_the_same(program: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    random = np.random.default_rng(1)
+    count = 1000 if program == "three variables" else 5003  # no multiple of eight
+    given = random.integers(-4, 7, (3, count)) / 4 + random.choice([0.0, 0.0, 1e-15, 1e-3], (3, count))
+    asked: list[tuple[Found, Found]] = []
+    by_machine_code = LoweredTopologies.run
+
+    def both(way: LoweredTopologies, function, env, batch):
+        plan, names = way.plan, way.plan.names
+        here = {name: module._spread(env[name], batch, False) for name in names}
+        found = by_machine_code(way, function, env, batch)
+        asked.append((module._found(plan, machines[-1], here, batch), found))
+        return found
+
+    machines = []
+    function = LoweredTopologies.function
+
+    def noted(way: LoweredTopologies, machine):
+        machines.append(machine)
+        return function(way, machine)
+
+    monkeypatch.setattr(LoweredTopologies, "run", both)
+    monkeypatch.setattr(LoweredTopologies, "function", noted)
+    f = potto.compile(PROGRAMS[program]).f
+    with potto.settings(backend="native"):
+        f(*given)
+    assert asked
+    for by_numpy, found in asked:
+        assert (by_numpy.plain == found.plain).all()
+        assert _cells(by_numpy) == _cells(found)
+    assert any(len(found.members) for _, found in asked)
+    assert not all(found.plain.all() for _, found in asked) or program == "one variable"
+
+
+def _cells(found: Found) -> list[tuple[int, ...]]:
+    columns = (found.members, *found.rows.reshape(2 * len(found.rows), found.members.size), found.sides)
+    return sorted(zip(*(column.tolist() for column in columns), strict=True))
+
+
+def test_what_may_be_anywhere_has_no_order() -> None:
+    random = np.random.default_rng(0)
+    places = random.random((5, 2000))
+    places[:2].sort(axis=0)
+    places[2:][random.random((3, 2000)) < 0.2] = np.nan
+    off = np.abs(places) * 1e-16
+    off[np.isnan(off)] = 0.0
+    anywhere = random.random((3, 2000)) < 0.05  # at infinity, and as far off
+    places[2:][anywhere], off[2:][anywhere] = random.choice([-np.inf, np.inf], anywhere.sum()), np.inf
+    order, count, fine = in_order(places, off)
+    assert 0 < fine.sum() < fine.size and not fine[anywhere.any(axis=0)].any()
+    for member in np.flatnonzero(fine):
+        own = order[: count[member], member]
+        assert (np.diff(places[own, member]) > 0).all() and {own[0], own[-1]} == {0, 1}
