@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 from msgspec import Struct
+from numpy.typing import NDArray
 
 from potto.core.terms import Term
 from potto.integrate.fixed.axes import Axis
@@ -46,7 +47,7 @@ class _Layout(Struct):
     constants: Array
     out: Array
     frame: Ints
-    tables: Sequence[Array]
+    tables: Sequence[NDArray[Any]]
     where: tuple[int, int]
 
     def run(self, function: Loaded, env: Mapping[str, Cell]) -> list[list[float]]:
@@ -71,9 +72,10 @@ class Face(Struct, frozen=True):
         lanes = np.minimum(np.arange(max(count, LANES)), count - 1)
         rows = np.array([cell.rows for cell in self.cells], dtype=float)[lanes]  # (lanes, variables, 2)
         ends = [np.ascontiguousarray(rows[:, i, side]) for i in range(rows.shape[1]) for side in (0, 1)]
+        nobody = np.zeros(lanes.size, dtype=np.int64)  # no parameter differs from cell to cell
         told = 3 * self.k1 + 3
         out = np.empty((told + self.k1 * len(self.axes), lanes.size))
-        frame = frame_of(out, self.axes, ends)
+        frame = frame_of(out, self.axes, [nobody, *ends])
         reads = tuple(
             (place.name, -1 if place.part.kind == "v" else place.part.direction)
             for place in self.way.places
@@ -81,7 +83,7 @@ class Face(Struct, frozen=True):
         )
         constants = np.empty(len(reads))
         where = address(frame), address(constants)
-        return _Layout(reads, constants, out[:told, :count], frame, ends, where)
+        return _Layout(reads, constants, out[:told, :count], frame, [nobody, *ends], where)
 
     def summed(self, function: Loaded, env: Mapping[str, Cell]) -> Totals | None:
         """The sums over all nodes of the cells; None where cuts cross."""

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 from msgspec import Struct, field
+from numpy.typing import NDArray
 
 from potto.core.terms import Term
 from potto.integrate.fixed.axes import Axis, Raw
@@ -76,7 +77,7 @@ def lowered_cells(plan: Straight, face: Term, directions: int, env: Mapping[str,
     return found
 
 
-def frame_of(out: Array, axes: Sequence[Axis], columns: Sequence[Array]) -> Ints:
+def frame_of(out: Array, axes: Sequence[Axis], columns: Sequence[NDArray[Any]]) -> Ints:
     """What a function is told: of how many members, LANES at least, where the rows of results go, the nodes, and where
     the columns are that it takes."""
     where = out.shape[1], out.strides[0] // out.itemsize, address(out)
