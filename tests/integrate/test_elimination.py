@@ -81,7 +81,7 @@ CASES: list[tuple[str, str, float, Number, float]] = [
      lambda t: t * (1 - t) * (t**3 / 3 + t * t / 2), 1e-10),
     ("jump in what is passed on", cube(5, "(if [a < t] then cos(b) + a else b)*exp(c)*[a + b + c < 1]*d*e"), 0.4,
      lambda t: (mp.quad(lambda s: (mp.exp(s) - mp.cos(s) - mp.sin(s)) / 2 + (1 - s) * (mp.exp(s) - 1 - s), [1 - t, 1])
-                + mp.quad(lambda s: mp.exp(s) - 1 - s - s * s / 2, [0, 1 - t])) / 4, 1e-8),  # s = 1 - a, over b, c by hand
+                + mp.quad(lambda s: mp.exp(s) - 1 - s - s * s / 2, [0, 1 - t])) / 4, 1e-8),  # by s = 1 - a
     ("larger one", cube(6, "[max(a, b) < t]*max(max(d, e), f)*c"), 0.7, lambda t: t**2 * mp.mpf(3) / 8, 1e-8),
     ("peak that nodes miss", cube(6, "exp(-1e9*(a - t)^2*(1 + b))*cos(b*c)*d*e*f"), 0.37,
      lambda t: mp.sqrt(mp.pi / mp.mpf(10)**9) / 8 * mp.quad(lambda b: mp.sinc(b) / mp.sqrt(1 + b), [0, 1]), 1e-4),

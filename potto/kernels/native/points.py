@@ -8,6 +8,7 @@ numbers that lie side by side.
 from __future__ import annotations
 
 import math
+from array import array
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -77,16 +78,16 @@ class Pointwise:
         parts = layout.parts
         numbers = {name: _part(args, parts[name]) for name in layout.uniform}
         given = layout.prelude(rt, *numbers.values())
-        constants = np.array([0.0 if x is None else x for x in given], dtype=float)
+        constants = array("d", [0.0 if x is None else x for x in given])
         arrays = [_part(args, parts[name]) for name in layout.arrays]
         shape = arrays[0].shape
-        if not all(a.shape == shape and a.flags.c_contiguous for a in arrays):
+        if not _flat(arrays, shape):
             shape = np.broadcast_shapes(*(a.shape for a in arrays))
         outputs = np.empty((len(layout.outputs), *shape))
         size, first = 8 * math.prod(shape), address(outputs)
         ends = [first + size * i for i in range(len(outputs))]
-        frame = np.array(_frame(arrays, shape) + ends, dtype=np.int64)
-        function.call(address(frame), address(constants))
+        frame = array("q", _frame(arrays, shape) + ends)
+        function.call(frame.buffer_info()[0], constants.buffer_info()[0])
         counts.native_points += size // 8
         numbers.update(zip(layout.given, given, strict=True))
         numbers.update(zip(layout.arrays, arrays, strict=True))
@@ -120,8 +121,9 @@ def _unpacked(result: Result, known: dict[str, Any]) -> Value:
     return Cell(part(result.v), part(result.e), tuple(map(part, result.t)), tuple(map(part, result.et)))
 
 
-def address(array: Any) -> int:
-    return array.__array_interface__["data"][0]  # type: ignore[no-any-return]
+def address(numbers: Any) -> int:
+    """Where the numbers of an array of numpy lie."""
+    return numbers.__array_interface__["data"][0]  # type: ignore[no-any-return]
 
 
 def _frame(arrays: list[Array], shape: tuple[int, ...]) -> list[int]:
@@ -129,20 +131,32 @@ def _frame(arrays: list[Array], shape: tuple[int, ...]) -> list[int]:
 
     Arrays that don't lie so are copied; they are replaced in the list, so that they live as long as it does.
     """
-    inner = shape[-1]
-    middle = shape[-2] if len(shape) > 1 else 1
-    found = [math.prod(shape[:-2]), middle, inner]
-    for i, a in enumerate(arrays):
-        steps = np.broadcast_to(a, shape).strides
-        front = [step for step, n in zip(steps[:-2], shape[:-2], strict=False) if n > 1]
-        if inner < LANES or steps[-1] != a.itemsize or len(front) > 1:
-            a = arrays[i] = np.ascontiguousarray(np.broadcast_to(a, shape))
-            steps = a.strides
-            front = [steps[-2] * middle] if len(shape) > 1 else []
-        found += [address(a), front[0] if front else 0, steps[-2] if len(shape) > 1 else 0]
-    if all(a.shape == shape and a.flags.c_contiguous for a in arrays):
-        return [1, 1, math.prod(shape), *(x for a in arrays for x in (address(a), 0, 0))]
+    if not _flat(arrays, shape):
+        inner = shape[-1]
+        middle = shape[-2] if len(shape) > 1 else 1
+        found = [math.prod(shape[:-2]), middle, inner]
+        for i, a in enumerate(arrays):
+            steps = np.broadcast_to(a, shape).strides
+            front = [step for step, n in zip(steps[:-2], shape[:-2], strict=False) if n > 1]
+            if inner < LANES or steps[-1] != a.itemsize or len(front) > 1:
+                a = arrays[i] = np.ascontiguousarray(np.broadcast_to(a, shape))
+                steps = a.strides
+                front = [steps[-2] * middle] if len(shape) > 1 else []
+            found += [address(a), front[0] if front else 0, steps[-2] if len(shape) > 1 else 0]
+        if not _flat(arrays, shape):
+            return found
+    found = [1, 1, math.prod(shape)]
+    for a in arrays:
+        found += (address(a), 0, 0)
     return found
+
+
+def _flat(arrays: list[Array], shape: tuple[int, ...]) -> bool:
+    """Whether all arrays are rows of numbers without gaps."""
+    for a in arrays:  # noqa: SIM110 - runs with every kernel: no generator
+        if a.shape != shape or not a.flags.c_contiguous:
+            return False
+    return True
 
 
 def _text(operations: Sequence[Operation], arrays: Sequence[str], given: Sequence[str], outputs: Sequence[str]) -> str:
