@@ -6,6 +6,7 @@ Owns the parser of arguments and what all commands share. Only the module of the
 from __future__ import annotations
 
 import argparse
+import gc
 import importlib
 import sys
 from collections.abc import Callable
@@ -14,6 +15,9 @@ from typing import Any, NoReturn
 from potto import __version__
 from potto.cli import COMMANDS, module_of
 from potto.cli.console import Console, standard_console
+
+# Of the garbage collector: nearly all that a command loads and makes stays. With Python's a start takes 9 ms more.
+THRESHOLDS = (50_000, 20, 20)
 
 
 class _Parser(argparse.ArgumentParser):
@@ -27,6 +31,7 @@ class _Parser(argparse.ArgumentParser):
 def dispatch(arguments: list[str]) -> int:
     """Find the command, parse its arguments, run it."""
     if arguments and arguments[0] in COMMANDS:
+        gc.set_threshold(*THRESHOLDS)
         module = importlib.import_module(module_of(arguments[0]))
         parser = _command_parser(arguments[0], module)
         prepare: Callable[[list[str]], list[str]] = getattr(module, "prepare", list)

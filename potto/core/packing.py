@@ -20,7 +20,7 @@ from msgspec import Struct, msgpack
 from potto import store
 from potto.core.consing import Base, own_fields
 from potto.core.kinds import rebuilt
-from potto.core.walking import postorder
+from potto.core.walking import unknown
 from potto.diagnostics import KINDS, Kind
 
 _TUPLE, _LIST, _SET, _DICT, _TERM, _STRUCT, _KIND, _FRACTION, _INTEGER = range(9)
@@ -70,7 +70,7 @@ class _Writer:
         self.kinds: list[str] = []
         self.rows: list[list[Any]] = []
         self.numbers: dict[type, int] = {}
-        self.terms: dict[int, int] = {}
+        self.terms: dict[Any, int] = {}
 
     def kind(self, cls: type) -> int:
         number = self.numbers.get(cls)
@@ -88,14 +88,13 @@ class _Writer:
 
     def term(self, term: Any) -> int:
         """The number of a term, after those of its subterms."""
-        if id(term) not in self.terms:
-            for node in postorder(term):
-                if id(node) not in self.terms:
-                    cls = type(node)
-                    row = [self.kind(cls), *(self.value(getattr(node, name)) for name in own_fields(cls))]
-                    self.terms[id(node)] = len(self.rows)
-                    self.rows.append(row)
-        return self.terms[id(term)]
+        if term not in self.terms:
+            for node in unknown(term, self.terms):
+                cls = type(node)
+                row = [self.kind(cls), *(self.value(getattr(node, name)) for name in own_fields(cls))]
+                self.terms[node] = len(self.rows)
+                self.rows.append(row)
+        return self.terms[term]
 
     def value(self, value: Any) -> Any:
         cls = type(value)

@@ -15,7 +15,7 @@ import numpy as np
 
 from potto.calculus.surfaces.discontinuities import TooDeep
 from potto.core.printer import format_term
-from potto.core.terms import Integral, Sum, Term
+from potto.core.terms import Data, Integral, Sum, Term
 from potto.diagnostics import PottoError, Related
 from potto.integrate.events import INFINITE, ROUGH, Shortfall
 from potto.kernels import errors
@@ -30,7 +30,6 @@ from potto.runtime.evaluation.duals import call_derivative, call_paired
 from potto.runtime.evaluation.folds import fold
 from potto.runtime.evaluation.functions import Closure, Derivative
 from potto.runtime.evaluation.kinks import note_kink
-from potto.runtime.evaluation.loading import loaded
 from potto.runtime.evaluation.machine import Linker, Machine, Record, Semantics
 from potto.runtime.evaluation.selection import chosen, lazy
 from potto.runtime.evaluation.sums import total
@@ -50,6 +49,12 @@ def _integral(machine: Machine, term: Integral, env: dict[str, Value]) -> Value:
     return integral(machine, term, env)
 
 
+def _loaded(term: Data) -> Value:
+    from potto.runtime.evaluation.loading import loaded
+
+    return loaded(term)
+
+
 def _culled(machine: Machine, term: Sum, first: int, last: int, env: dict[str, Value]) -> Value | None:
     from potto.runtime.integration.culling import culled
 
@@ -63,8 +68,8 @@ def _added(machine: Machine, terms: tuple[Term, ...], env: dict[str, Value]) -> 
 
 
 SEMANTICS = Semantics(
-    call_derivative, call_paired, chosen, lazy, _added, total, _culled, array, element, length, loaded, fold, _integral,
-    note_kink,
+    call_derivative, call_paired, chosen, lazy, _added, total, _culled, array, element, length, _loaded, fold,
+    _integral, note_kink,
 )  # fmt: skip
 
 

@@ -8,7 +8,6 @@ and the processor.
 from __future__ import annotations
 
 import ctypes
-import ctypes.util
 import itertools
 import os
 import sys
@@ -38,6 +37,8 @@ class _Compiler:
     """LLVM, for the processor at hand."""
 
     def __init__(self) -> None:
+        import ctypes.util  # which loads more than the rest of this module
+
         from llvmlite import binding
 
         self.binding: Any = binding

@@ -6,7 +6,6 @@ chosen in `printing`.
 
 from __future__ import annotations
 
-import html
 import re
 from collections.abc import Sequence
 from typing import Any
@@ -18,6 +17,8 @@ Row = tuple[str, Any, Any]  # what a number is called, the number, its error
 
 def as_html(value: Any, error: Any, missed: str, cost: str) -> str:
     """The number with its bar, in front what it missed, and behind it what it cost, in small print."""
+    import html  # its table of signs takes longer to load than all else here, and only notebooks ask
+
     warning = f'<strong style="color:#b3261e">{html.escape(missed)}</strong> ' if missed else ""
     text = html.escape(with_error(value, error))
     return f'{warning}<code>{text}</code> <small style="opacity:.7">{html.escape(cost)}</small>'
@@ -27,6 +28,8 @@ def rows_html(rows: Sequence[Row], missed: str, cost: str) -> str:
     """A table: what each number is called, the number with its bar; what it cost below."""
     if len(rows) == 1:
         return as_html(*rows[0][1:], missed, cost)
+    import html
+
     warning = f'<strong style="color:#b3261e">{html.escape(missed)}</strong>' if missed else ""
     lines = [
         f'<tr><td style="text-align:left">{html.escape(label.strip())}</td>'

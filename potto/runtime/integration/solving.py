@@ -64,11 +64,11 @@ def by_elimination(problem: Problem) -> Sums | None:
 
 def by_samples(problem: Problem) -> Sums | None:
     """All variables at once, where that was asked for, or where they are too many for rules."""
-    from potto.integrate.montecarlo.sampling import sample
-
     method = problem.machine.settings.method
     if placed_along(problem.term) is not None or (method not in ("mc", "qmc") and not too_many(problem)):
         return None
+    from potto.integrate.montecarlo.sampling import sample
+
     plan = problem.plan()
     sums = counted(problem, plan, sample(plan, problem.machine, problem.env, problem.batch, method), drawn=True)
     problem.machine.record.methods.add("mc" if method == "mc" else "qmc")
