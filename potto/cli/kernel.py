@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import importlib.util
 import json
 import os
@@ -36,6 +37,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
         place.write_text(json.dumps(spec, indent=1) + "\n", encoding="utf-8")
     elif options.action == "remove":
         place.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):  # what else somebody has put there stays
+            folder.rmdir()
     if options.json:
         console.answer_json({"folder": str(folder), "installed": place.is_file()})
     else:

@@ -19,29 +19,31 @@ import numpy as np
 UNIT_ROUNDOFF = 2.0**-53
 LARGEST = 2.0**53  # up to here every whole number is a double
 HIGHEST = 64.0  # powers that are worked out again
+SHORT = 1024  # elements that are looked at one by one: what people read
 
 
 class _Looking(threading.local):
-    """Whether members of batches are looked at one by one, in this thread."""
+    """The largest batches whose members are looked at one by one, in this thread."""
 
-    through = False
+    most = 0.0
 
 
 _looking = _Looking()
 
 
 @contextmanager
-def looked_through() -> Iterator[None]:
-    """In this block batches are as exact as single numbers: where they are the steps of a loop."""
-    before, _looking.through = _looking.through, True
+def looked_through(most: float = math.inf) -> Iterator[None]:
+    """Batches of up to so many members are as exact as single numbers in this block: where they are the steps of a loop
+    or the elements of an array."""
+    before, _looking.most = _looking.most, max(most, _looking.most)
     try:
         yield
     finally:
-        _looking.through = before
+        _looking.most = before
 
 
 def _members(value: Any) -> bool:
-    return _looking.through and isinstance(value, np.ndarray)
+    return isinstance(value, np.ndarray) and value.size <= _looking.most
 
 
 def _rounded(value: Any, exact: Any) -> Any:
@@ -49,7 +51,10 @@ def _rounded(value: Any, exact: Any) -> Any:
 
 
 def _all_whole(*numbers: Any) -> Any:
-    return np.logical_and.reduce(np.broadcast_arrays(*[np.rint(x) == x for x in numbers]))
+    found: Any = True
+    for x in numbers:
+        found = found & (x.is_integer() if isinstance(x, float) else np.rint(x) == x)
+    return found
 
 
 def _whole(*numbers: Any) -> bool:
@@ -62,7 +67,7 @@ def add(value: Any, *args: Any) -> Any:
     Of a batch the last one counts as half a unit in the last place, which takes two passes and not six: only what was
     lost on the way may be more than the value tells.
     """
-    batch = isinstance(value, np.ndarray) and not _looking.through
+    batch = isinstance(value, np.ndarray) and not _members(value)
     off: Any = UNIT_ROUNDOFF * abs(value) if batch else 0.0
     total: Any = args[0]
     for number, arg in enumerate(args[1:], 2):

@@ -11,7 +11,7 @@ BEHIND = ENDS_OPERAND - {"NUMBER"}
 """What a bracket or a dot belongs to that stands directly behind it."""
 _THROUGH = re.compile(rf"[ \t\n]+{FIRST_NAME.pattern}[ \t\n]+in\b")
 _CONTEXTUAL = {
-    "fold": ("FOLD", re.compile(rf"[ \t\n]*(?:[ \t\n]{FIRST_NAME.pattern}|\([^()]*\))[ \t\n]*=(?!=)")),
+    "fold": ("FOLD", re.compile(rf"[ \t\n]*(?:[ \t\n]{FIRST_NAME.pattern}|\((?:[^()]|\([^()]*\))*\))[ \t\n]*=(?!=)")),
     "with": ("WITH", re.compile(rf"[ \t\n]+(?:\([ \t\n]*)?{FIRST_NAME.pattern}[ \t\n]*=(?!=)")),
     "record": ("RECORDDEF", re.compile(rf"[ \t]+{FIRST_NAME.pattern}[ \t]*\(")),
     "product": ("SUM", _THROUGH),

@@ -220,7 +220,10 @@ def _not_a_name(context: Context, written: Written, what: str) -> None:
     shown = context.text[span.start : span.end]
     message = f"`{shown}` is not a name: a {what} must be one" if len(shown) < 40 else f"a {what} must be a name"
     apart = isinstance(written.value, Apply) and all(isinstance(a.value, Name) for a in written.value.arguments)
-    context.report(kinds.NOT_A_NAME(span, message, help="write `,` between the two" if apart else ""))
+    help = "write `,` between the two" if apart else ""
+    if isinstance(written.value, Tuple):
+        help = "give it one name, such as `p`: its parts are `p.0`, `p.1`"
+    context.report(kinds.NOT_A_NAME(span, message, help=help))
 
 
 def as_binders(context: Context, group: Group, what: str) -> tuple[Binder, ...]:

@@ -6,6 +6,7 @@ user's words.
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 from msgspec import Struct
@@ -281,31 +282,48 @@ def _missing_name(stop: Stop) -> Diagnostic:
     return kinds.NOT_A_NAME(before.span, f"expected a name after `{_shown(before)}`")
 
 
+_GOES_WITH = {
+    "THEN": "`then` goes with an `if` before it",
+    "ELSE": "`else` goes with an `if` before it",
+    "IN": "`in` goes with `let`, `for` or `sum`",
+    "DEF": "a `def` starts in the first column",
+    "FROM": "an import starts in the first column",
+    "IMPORT": "an import starts in the first column",
+    "FOR": "a `for` starts a line of its own",
+    "SUM": "write `sum i in 1..n (body)`",
+    "IF": "an `if` comes first: `if p then a else b`",
+    "SEMI": "a line ends without `;`",
+    "COMMA": "to make a tuple, write parentheses around it",
+    "TILDE": "`x ~ normal(m, s)` goes among the bounds of an integral",
+    "DOTDOT": "`1..n` goes with `sum`",
+    "DOT": "a lambda starts with `\\`",
+    "COLON": "a choice is written `p ? a : b`",
+    "AS": "`as` goes with an import",
+    "ARROW": "`->` goes before the type of a definition's result",
+}
+"""What is said of a word that stands where it has no meaning."""
+_SEVERAL = re.compile(r"\s*\([^()]*\)\s*in\b")
+_OF_ARRAY = re.compile(r"\s*\(\s*([^\W\d]\w*)\s*\)")
+
+
+def _loop_hint(stop: Stop) -> str:
+    """What to write for a loop over tuples by the names of their parts, or for `sum(xs)`."""
+    at, rest = stop.at, stop.text[stop.at.end :]
+    if (at.kind in ("SUM", "FOR") and _SEVERAL.match(rest)) or (
+        at.kind == "IN" and stop.before is not None and stop.before.kind == "RPAR"
+    ):
+        return "what goes through an array has one name: `sum p in ps (p.0*p.1)`"
+    whole = _OF_ARRAY.match(rest) if at.kind == "SUM" else None
+    return f"write `sum x in {whole[1]} (x)`" if whole is not None else ""
+
+
 def _unexpected(stop: Stop) -> Diagnostic:
     at, opened = stop.at, stop.opened
     if not at.text:
         before = stop.before
         what = f"something is missing after `{_shown(before)}`" if before is not None else "something is missing"
         return kinds.UNFINISHED(stop.place, what)
-    hint = {
-        "THEN": "`then` goes with an `if` before it",
-        "ELSE": "`else` goes with an `if` before it",
-        "IN": "`in` goes with `let`, `for` or `sum`",
-        "DEF": "a `def` starts in the first column",
-        "FROM": "an import starts in the first column",
-        "IMPORT": "an import starts in the first column",
-        "FOR": "a `for` starts a line of its own",
-        "SUM": "write `sum i in 1..n (body)`",
-        "IF": "an `if` comes first: `if p then a else b`",
-        "SEMI": "a line ends without `;`",
-        "COMMA": "to make a tuple, write parentheses around it",
-        "TILDE": "`x ~ normal(m, s)` goes among the bounds of an integral",
-        "DOTDOT": "`1..n` goes with `sum`",
-        "DOT": "a lambda starts with `\\`",
-        "COLON": "a choice is written `p ? a : b`",
-        "AS": "`as` goes with an import",
-        "ARROW": "`->` goes before the type of a definition's result",
-    }.get(at.kind, "")
+    hint = _loop_hint(stop) or _GOES_WITH.get(at.kind, "")
     if at.kind in ("NAME", "NUMBER", "MEMBER") and stop.before is not None:
         return kinds.UNEXPECTED(at.span, f"`{_shown(at)}` does not belong after `{_shown(stop.before)}`", help=hint)
     related = _from(opened) if opened is not None and at.kind in ("NEWLINE", "RPAR", "RSQB") else ()

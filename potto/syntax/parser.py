@@ -131,6 +131,12 @@ def _too_long(text: str) -> Diagnostic:
     return kinds.TOO_DEEP(place, message, help="is this a Potto program? If so, cut it into several definitions")
 
 
+def _guessed(found: list[Diagnostic], text: str) -> int:
+    """Where a bracket opens that is never closed. Its end is guessed, and what the grammar says of the rest is about
+    the guess."""
+    return min([d.span.start for d in found if d.code == kinds.BRACKETS.code and d.related], default=len(text))
+
+
 def _sorted(diagnostics: list[Diagnostic]) -> tuple[Diagnostic, ...]:
     return tuple(sorted(diagnostics, key=lambda diagnostic: diagnostic.span.start))
 
@@ -142,18 +148,21 @@ def _parse(lexed: Lexed, text: str, start: str, diffeo: bool = False) -> _Parse:
     index = engine.run(tokens, 0)
     first_stop: Stop | None = None
     stops: list[Diagnostic] = []
+    guessed = _guessed(found, text)
     for _ in range(MOST_ERRORS):
         if index >= len(tokens):
-            found += stops + _causes(engine.context.diagnostics, found + stops)
+            causes = [d for d in engine.context.diagnostics if d.span.end <= guessed]
+            found += stops + _causes(causes, found + stops)
             return _Parse(engine.result, tokens, found, first_stop, stops)
         stop, engine, edits = _stopped(engine, tokens, index, Context(text, diffeo))
         first_stop = first_stop or stop
         if not stop.at.text:
             found = _without_doubled(found, stop)
-        said = habit(stop)
-        if said is not None:
-            return _Parse(None, tokens, [*found, *stops, said], first_stop, stops)
-        if not _explained(stop, found):
+        foreign = habit(stop)
+        if foreign is not None:
+            told = [foreign] if stop.place.start <= guessed else []
+            return _Parse(None, tokens, [*found, *stops, *told], first_stop, stops)
+        if stop.place.start <= guessed and not _explained(stop, found):
             said = describe(stop, edits or [])
             if all(d.code != kinds.UNFINISHED.code or d.span != said.span for d in found):  # an `integral` alone
                 stops.append(said)

@@ -20,9 +20,11 @@ from potto.types.types import (
     ANY_SIZE,
     REAL,
     UNKNOWN,
+    AnySize,
     ArrayOf,
     Count,
     Function,
+    Shifted,
     TupleOf,
     Type,
     Unknown,
@@ -69,6 +71,7 @@ def _in_range(inference: Inference, size: Type, node: nodes.Index, place: int) -
     known = _constant(index)
     if known is None:
         _whole(inference, index)
+        _behind(inference, size, node, index)
     elif not isinstance(size, Count):
         _from_the_end(inference, known, node, place)
     elif not 0 <= known < size.number:
@@ -86,6 +89,30 @@ def _whole(inference: Inference, index: nodes.Expr) -> None:
         index.span, f"an index must be a whole number, but this is {value:g}", label="not a whole number",
         help="elements are counted: `xs[0]`, `xs[1]`; to look between them, write `interp(places, xs, x)`",
         suggestions=tuple(suggest(index.span, str(number)) for number in near),
+    ))  # fmt: skip
+
+
+def _behind(inference: Inference, size: Type, node: nodes.Index, index: nodes.Expr) -> None:
+    """Report an index that is the size of the array, or more, whatever that is: `xs[n]`, `xs[len(xs)]`."""
+    at = shifted(_size(inference, index), 0)
+    if isinstance(at, Count) and isinstance(size, Count):
+        if at.number >= size.number:
+            _out_of_range(inference, at.number, size.number, node, index)
+        return
+    (base, offset), (same, count) = (
+        (size.base, size.offset) if isinstance(size, Shifted) else (size, 0) for size in (at, size)
+    )
+    if base is not same or isinstance(base, AnySize | Unknown) or offset < count:
+        return
+    written = without_parentheses(index)
+    first = written.first if isinstance(written, nodes.Chain) else written
+    own = _size(inference, first)
+    lower = (size.offset if isinstance(size, Shifted) else 0) - (own.offset if isinstance(own, Shifted) else 0) - 1
+    last = print_expression(first) + (f" {'+' if lower > 0 else '-'} {abs(lower)}" if lower else "")
+    message = f"the index `{print_expression(index)}` is out of range: it is not below the number of elements"
+    inference.report(kinds.OUT_OF_RANGE(
+        index.span, message, label="behind the last", related=_defined(inference, node.array, "is defined here"),
+        help=f"indices count from 0, so that the last one is `{last}`", suggestions=(suggest(index.span, last),),
     ))  # fmt: skip
 
 
@@ -138,8 +165,7 @@ def _defined(inference: Inference, array: nodes.Expr, what: str) -> tuple[Relate
     item = definition(inference.outside.db, file, name)
     if not isinstance(item, nodes.Definition):
         return ()
-    here = None if file == inference.outside.file else file
-    return (Related(item.name_span, f"`{name}` {what}", here, name),)
+    return (Related(item.name_span, f"`{name}` {what}", file, name),)
 
 
 def _constant(expr: nodes.Expr) -> int | None:

@@ -89,8 +89,19 @@ def mismatch(
         help = "it is applied there, as a function; if a product is meant, write it with `*`"
     elif isinstance(resolve(actual), ArrayOf) and isinstance(resolve(expected), Real):
         help = "write it for each element, `[… for x in xs]`, or take one, `xs[i]`"
+    elif isinstance(resolve(expected), ArrayOf):
+        help = _columns(resolve(actual), expr)
     message = f"{what} must be `{wanted}`, but this is `{shown}`"
     return kind(expr.span, message, label=f"this is `{shown}`", related=related, help=help)
+
+
+def _columns(actual: Type, expr: nodes.Expr) -> str:
+    """What to write where a table stands for one of its columns."""
+    if not isinstance(actual, TupleOf) or actual.record is None or not isinstance(expr, nodes.Name | nodes.Member):
+        return ""
+    fields = zip(actual.record.fields, actual.items)
+    arrays = [f"`{print_expression(expr)}.{name}`" for name, item in fields if isinstance(resolve(item), ArrayOf)]
+    return f"take one of its columns: {', '.join(arrays[:3])}" if arrays else ""
 
 
 def differs_in_size(actual: Type, expected: Type) -> bool:
@@ -214,10 +225,9 @@ def shadowing(local: Local, before: Local) -> Diagnostic:
 def no_field(outside: Outside, span: Span, name: str, record: RecordName, label: str) -> Diagnostic:
     """What is said of a field that a record doesn't have."""
     item = definition(outside.db, record.file, record.name) if "." not in record.name else None  # else it is data
-    here = None if record.file == outside.file else record.file
     related = _header(outside, record, name)
     if item is not None:
-        related = (Related(item.name_span, f"`{record.name}` is defined here", here, record.name),)
+        related = (Related(item.name_span, f"`{record.name}` is defined here", record.file, record.name),)
     near = near_names(name, record.fields)
     help = did_you_mean(near) or "it has " + ", ".join(f"`{name}`" for name in record.fields)
     message = f"a record `{record.name}` has no field `{name}`"

@@ -152,10 +152,7 @@ class _Wording:
         given, owner = self._origin(source)
         if given is None:
             return Related(self.span, f"an integral of `{owner.name}` varies it")
-        return Related(given.span, f"`{given.variable}` is bound here", self._file(owner), owner.name)
-
-    def _file(self, target: DefinitionTarget) -> str | None:
-        return None if target.file == self.outside.file else target.file
+        return Related(given.span, f"`{given.variable}` is bound here", owner.file, owner.name)
 
     def _elsewhere_related(self, target: DefinitionTarget, reason: Reason) -> list[Related]:
         found: list[Related] = []
@@ -163,7 +160,7 @@ class _Wording:
         for _ in range(MAX_DEPTH):
             if current is None:
                 break
-            file, owner = self._file(target), target.name
+            file, owner = target.file, target.name
             found += [Related(s.span, s.message, file, owner) for s in current.steps if s.span != current.span]
             found.append(Related(current.span, current.text, file, owner))
             if current.further is None:

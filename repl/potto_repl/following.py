@@ -13,7 +13,7 @@ from msgspec import Struct
 from potto.core.terms import Global, postorder
 from potto.elaborate import core, core_term
 from potto.evaluating.session import Imported, Said
-from potto.modules import imported_files, names
+from potto.modules import imported_files, names, references
 from potto.modules.texts import chunk_text
 from potto.reports.render import Located, ProgramError, display_name
 from potto_repl.reply import Part, Refusal, diagnostic, note
@@ -22,6 +22,7 @@ from potto_repl.session import Conversation
 MOST_REASONS = 12  # that are listed
 
 Definition = tuple[str, str]  # its file and its name
+Remark = tuple[str | None, str, str]  # where, its code and its message
 
 
 def _program(path: str) -> str:
@@ -83,7 +84,7 @@ def refreshed(session: Conversation, quiet: bool = False) -> list[Part]:
         return [] if quiet else [Part("answer", "nothing has changed", {"reloaded": []})]
     parts: list[Part] = []
     with session.db.recording() as events:
-        total = _check_all(session, before.files, parts)
+        total = _check_all(session, before, parts)
     again = {(str(e.args[0]), str(e.args[1])) for e in events if e.kind == "executed" and e.query == "core"}
     why = _reasons(session, again, before.texts)
     milliseconds = (time.perf_counter() - start) * 1e3
@@ -104,15 +105,21 @@ def _stamp(file: str) -> tuple[int, ...] | None:
 
 
 class _State(Struct, frozen=True):
-    """The texts of the files and of their definitions."""
+    """The texts of the files and of their definitions, and the warnings and hints that have been seen."""
 
     files: dict[str, str]
     texts: dict[Definition, str | None]
+    seen: frozenset[Remark]
 
     @classmethod
     def of(cls, session: Conversation) -> _State:
         files = {file: text.text for file in _files(session) if (text := session.world.source(file)) is not None}
-        return cls(files, {(f, n): chunk_text(session.db, f, n) for f in files for n in names(session.db, f)})
+        texts = {(f, n): chunk_text(session.db, f, n) for f in files for n in names(session.db, f)}
+        return cls(files, texts, frozenset(_remark(said) for f in files for said in session.world.diagnostics(f)))
+
+
+def _remark(said: Located) -> Remark:
+    return said.file, said.diagnostic.code, said.diagnostic.message
 
 
 def _reasons(session: Conversation, again: set[Definition], before: dict[Definition, str | None]) -> dict[str, str]:
@@ -131,6 +138,8 @@ def _reasons(session: Conversation, again: set[Definition], before: dict[Definit
             why[item[1]] = "its text changed"
         elif changed:
             why[item[1]] = f"it uses {', '.join(f'`{name}`' for name in changed)}, which changed for its users"
+        elif (None, "load") in references(session.db, *item):
+            why[item[1]] = "the file that it loads changed"
         else:
             why[item[1]] = "a name in it means something else now"
     return {**why, **{name: "it is gone" for file, name in before.keys() - set(now)}}
@@ -148,18 +157,20 @@ def _files(session: Conversation) -> list[str]:
     return list(found)
 
 
-def _check_all(session: Conversation, before: dict[str, str], parts: list[Part]) -> int:
-    """Check the files, set aside those that are broken now, elaborate the rest; how many definitions there are."""
+def _check_all(session: Conversation, before: _State, parts: list[Part]) -> int:
+    """Check the files, set aside texts that are broken now, elaborate the rest; how many definitions there are."""
     found: dict[str, list[Located]] = {}
     for file in _files(session):
         found[file] = list(session.world.diagnostics(file))
     for file, said in found.items():
-        parts += [diagnostic(located, session.source) for located in said]
-        if any(located.diagnostic.severity == "error" for located in said) and file in before:
+        wrong = [located for located in said if located.diagnostic.severity == "error"]
+        parts += [diagnostic(d, session.source) for d in said if d in wrong or _remark(d) not in before.seen]
+        text = session.world.source(file)
+        if wrong and file in before.files and (text is None or before.files[file] != text.text):
             parts.append(note(f"{display_name(file)}: the definitions of before are kept"))
             session.broken[file] = _stamp(file)
     for file in session.broken:
-        session.world.files.set_text(file, before[file])
+        session.world.files.set_text(file, before.files[file])
     return _elaborated(session)
 
 

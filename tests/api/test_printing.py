@@ -292,3 +292,23 @@ def test_ten_thousand_printed_intervals_contain_their_values() -> None:
             assert middle - bar - slack - bar / 10**10 <= low and high <= middle + bar + slack + bar / 10**10, text
         alone = Fraction(format_number(value, error))
         assert abs(alone - Fraction(value)) <= 10 * Fraction(error) + abs(Fraction(value)) / 10**15, (value, error)
+
+
+@pytest.mark.parametrize(
+    ("written", "total"),
+    [
+        ("[i^2 for i in 0..99]", 328350),
+        ("2*[1, 2, 3]", 12),
+        ("sum i in 1..99 (3*i)", 14850),
+        ("sum k in [1, 5] (k*k)", 26),
+    ],
+)
+def test_whole_numbers_in_arrays_are_exact(written: str, total: int) -> None:
+    answer = potto.compile(f"f = {written}").f
+    assert not np.any(answer.error) and np.sum(answer.value) == total
+
+
+def test_what_is_rounded_in_sums_is_told() -> None:
+    many = potto.compile("f = sum i in 1..7 (2^51*i + i)\ng = sum i in 1..3 (i/10)")
+    for answer, exact in ((many.f, 28 * Fraction(2**51 + 1)), (many.g, Fraction(6, 10))):
+        assert 0 < abs(Fraction(float(answer.value)) - exact) <= Fraction(float(answer.error))

@@ -60,6 +60,13 @@ def test_the_place_in_the_expression_itself(
     assert f"<expression>:1:{column}\n" in capsys.readouterr().err
 
 
+def test_what_a_program_defines_is_shown_where_it_stands(program: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    program.write_text("record Camera(focal: Real)\nnear = Camera(focal=1)\n")
+    assert main(["eval", str(program), "near with fokal = 3"]) == 1
+    shown = capsys.readouterr().err
+    assert "<expression>:1:11\n" in shown and "main.po:1:8\n" in shown
+
+
 def test_in_a_script(program: Path, capsys: pytest.CaptureFixture[str]) -> None:
     script = program.with_name("script.po")
     script.write_text("from main import outer\nk = 9\ndef g(t) t*outer(k)\nprint(g(1))\n")

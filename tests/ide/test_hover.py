@@ -328,3 +328,9 @@ def test_what_a_file_of_data_holds(tmp_path):
     said = hover(library.db, key, 2)
     assert said is not None
     assert "height [3] from 1.5 to 2" in said.markdown
+
+
+@pytest.mark.parametrize("made", ["(1, 2)", "[1, 2, 3]", "integral [0, 1] [x < 0.3] d(x)"])
+def test_what_nothing_moves_has_no_derivative(made: str) -> None:
+    assert "deriv" not in (text := fixture(f"k = {made}\n").hover("k")) and "d k" not in text and "k : " in text
+    assert "d k : " in fixture("k = (sin, cos)\n").hover("k")

@@ -292,6 +292,22 @@ def test_watch_reloads_by_itself(talk):
     assert "recompiled" not in talk("f(1)").text
 
 
+def test_a_file_of_data_that_is_edited(talk):
+    talk.write("people.csv", "height\n1\n3\n")
+    talk.write("a.po", 'people = load("people.csv")\ndef f(t) integral [0, 2] [x^3 - x < t] d(x)\n')
+    assert "P0616" in talk(":load a.po").text
+    talk.write("people.csv", "height\n1\n3\n8\n")
+    reply = talk(":reload")
+    assert re.fullmatch(r"1 of 2 recompiled, \d+ ms\n  people: the file that it loads changed", reply.text)  # no hint
+    assert talk.data("sum h in people.height (h)")["value"] == 12
+    talk.write("people.csv", "height\n1\n3\nx8\n")
+    reply = talk(":reload")
+    assert reply.failed and "line 4, column `height`" in reply.text and "of before" not in reply.text
+    talk.write("people.csv", "height\n1\n2\n")
+    assert not talk(":reload").failed
+    assert talk.data("sum h in people.height (h)")["value"] == 3
+
+
 def test_load_says_what_is_wrong(talk):
     talk.write("renderer.po", "def f(t) t")
     assert "did you mean `renderer.po`?" in talk(":load rendrer.po").text

@@ -34,6 +34,8 @@ def client(tmp_path_factory):
     yield client
     client.stop_channels()
     manager.shutdown_kernel(now=True)
+    subprocess.run([sys.executable, "-m", "potto", "kernel", "remove"], env=environment, check=True)
+    assert not os.listdir(data / "kernels")
 
 
 def run(client, code):

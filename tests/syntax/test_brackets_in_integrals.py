@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from potto.syntax import parse_expression
+from potto.syntax import parse_chunk, parse_expression
 
 
 @pytest.mark.parametrize(
@@ -24,6 +24,21 @@ def test_one_bracket_is_missing(text: str, mended: str) -> None:
     (edit,) = suggestion.edits
     assert text[: edit.span.start] + edit.text + text[edit.span.end :] == mended
     assert not parse_expression(mended).diagnostics
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "def f(corners: [m (Real, Real), faces: [n] (Real, Real, Real), photo: [h, w] Real) corners[0].0",
+        "def f(corners: [m] (Real, Real), photo: [h, w (Real, Real, Real), k) corners[0].0",
+        "def stress(x, y 1/(1 + x^2 + y^2)",
+        "def f(x) integral ([0, 1], [x, 1] [u < v]*(if [u > x] then 1 else 2) d(u, v)",
+        "def f(xs: [n] Real) [xs[i + 1 - xs[i] for i in 0..n-2]",
+    ],
+)
+def test_one_that_is_missing_in_a_definition_is_one_mistake(text: str) -> None:
+    (said,) = parse_chunk(text).diagnostics
+    assert said.code == "P0102" and "never closed" in said.message
 
 
 def test_several_are_missing() -> None:

@@ -268,6 +268,10 @@ def test_names() -> None:
     check_messages("""
         def f(3) x
         #     ^ error[P0115]: `3` is not a name: a parameter must be one
+        def f((a, b), c) a
+        #     ^^^^^^ error[P0115]: `(a, b)` is not a name: a parameter must be one
+        def f(n) fold ((a, b), c) = ((1, 2), 3) for i in 1..n (((a + c, b), c))
+        #              ^^^^^^ error[P0115]: `(a, b)` is not a name: a state must be one
         def f(a=1) a
         #     ^^^ error[P0115]: a parameter can't have a default value
         x = integral [0, 1] x d(2*x)

@@ -107,6 +107,26 @@ def test_indices() -> None:
     """)
 
 
+def test_an_index_that_is_a_size() -> None:
+    check("""
+        def a(xs: [n] Real) xs[n]
+        #                      ^ error[P0328]: the index `n` is out of range: it is not below the number of elements
+        def b(xs: [n, m] Real) xs[n - 1, m] + xs[n - 1, m - 1]
+        #                                ^ error[P0328]: the index `m` is out of range
+        def c(xs: [n + 1] Real) xs[n] + xs[n + 2]
+        #                                  ^^^^^ error[P0328]: the index `n + 2` is out of range
+        def d(xs: [n] Real, ys: [m] Real) xs[m] + ys[len(xs)] + ys[len(ys)]
+        #                                                          ^^^^^^^ error[P0328]: the index `len(ys)`
+        def e(xs: [n] Real) (let ds = [xs[i + 1] - xs[i] for i in 0..n-2] in ds[n - 1])
+        #                                                                       ^^^^^ error[P0328]: the index `n - 1`
+        k = [1, 2, 3]
+        l = k[len(k)]
+        #     ^^^^^^ error[P0328]: the index 3 is out of range: the array has 3 elements
+    """)
+    assert only("def a(xs: [n] Real) xs[n]").help == "indices count from 0, so that the last one is `n - 1`"
+    assert only("def a(xs: [n + 2] Real) xs[n + 3]").help == "indices count from 0, so that the last one is `n + 1`"
+
+
 def test_an_index_inside_of_another_definition_must_not_vary() -> None:
     check("""
         def at(xs, i) xs[i]

@@ -22,7 +22,7 @@ from potto.calculus.solving.enclosable import searchable
 from potto.calculus.solving.inverse_map import Failure, Inverse, dependence, invert, jacobian, listed
 from potto.calculus.solving.solve import Sections, sections
 from potto.calculus.surfaces.nested_brackets import in_loops, pieces
-from potto.core.printer import abridged, format_term
+from potto.core.printer import LONGEST, abridged, format_term
 from potto.core.terms import App, Branch, Global, If, Integral, Prim, Term, postorder, var
 from potto.diagnostics import Kind, declare
 from potto.primitives import PRIMITIVES
@@ -258,9 +258,12 @@ def searched(surfaces: Sequence[Term], variables: Sequence[str], roots: str) -> 
     """What to say of surfaces that have no closed form along any variable."""
     further = [v for v in variables if v != roots]
     cost = f"once for each node in {listed(further)}" if further else "once for each value of the integral"
+    what = f"where {shown(surfaces)} {'is' if len(surfaces) == 1 else 'are'} 0"
+    if any(len(format_term(surface)) > LONGEST for surface in surfaces):  # what is written says more, and stands there
+        what = "this surface"
     return Problem(
         SEARCHED,
-        f"where {shown(surfaces)} {'is' if len(surfaces) == 1 else 'are'} 0 has no closed form: it is searched for",
+        f"{what} has no closed form: it is searched for",
         "searched for",
         (f"`{roots}` is halved until interval arithmetic has told all roots apart, {cost}",),
         "nothing has to be done; a condition that can be solved for a variable is faster",

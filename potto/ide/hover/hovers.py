@@ -46,6 +46,7 @@ from potto.primitives import PRIMITIVES, Primitive
 from potto.query import Database, query
 from potto.syntax import nodes
 from potto.types import check_definition, format_type, interface
+from potto.types.types import holds_functions
 
 _CALL = re.compile(r"\w+\([^()]*\)")  # a formula that can be a factor as it stands
 MOST_NAMES = 40  # definitions of a module that a hover lists
@@ -104,7 +105,7 @@ def definition_markdown(db: Database, file: str, name: str) -> str:
         parts.append(known if known is not None else _no_diffeo(db, file, name))
     elif item is not None and (held := data_markdown(db, file, item)):
         parts.append(held)
-    elif item is not None:
+    elif item is not None and holds_functions(found.type):
         derivative = derivative_text(db, file, name)
         parts += [] if derivative is None else derivative_parts(derivative, condition_infos(db, file, name))
     return "\n\n".join(parts)

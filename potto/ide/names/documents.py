@@ -12,6 +12,7 @@ from potto.query import Database, query
 from potto.source import Span
 from potto.syntax import ParsedChunk, nodes
 from potto.types import Function, Unknown, derivative_type, format_type, interface
+from potto.types.types import holds_functions
 
 
 @query
@@ -46,11 +47,11 @@ def _prose(found: ParsedChunk, end: int) -> str:
 
 @query
 def definition_head(db: Database, file: str, name: str) -> str:
-    """`f : T` and under it the type of its derivative."""
+    """`f : T` and under it the type of its derivative, if there is a function in it."""
     type = interface(db, file, name).type
     lines = [f"{name} : {format_type(type)}"]
     derived = derivative_type(type)
-    if not isinstance(derived, Unknown):
+    if not isinstance(derived, Unknown) and holds_functions(type):
         lines.append(f"{'d' + name if isinstance(type, Function) else 'd ' + name} : {format_type(derived)}")
     return "\n".join(lines)
 

@@ -15,6 +15,7 @@ from potto.diagnostics import PottoError, declare
 from potto.kernels import errors
 from potto.kernels.cells import Cell, Number, Rows, Value, all_arrays, listed
 from potto.kernels.rows import gathered
+from potto.kernels.whole import SHORT, looked_through
 from potto.runtime.evaluation.functions import Closure, chosen, holds_functions
 from potto.runtime.evaluation.machine import Machine
 
@@ -38,7 +39,8 @@ def array(machine: Machine, term: ArrayTerm, size: Value, env: Env) -> Value:
         return Rows(Cell(np.zeros(0), None, (None,) * machine.directions), 0)
     places = np.arange(count, dtype=float).reshape(count, *(1,) * len(shape))
     here = {**env, term.variable: Cell(places, None, (None,) * machine.directions)}
-    value = machine.run(body, [here[name] for name in params], None)
+    with looked_through(SHORT):
+        value = machine.run(body, [here[name] for name in params], None)
     if holds_functions(value):
         return _one_by_one(machine, body, count, env, term.variable)
     return Rows(_in_front(value, count, shape, 0), count)

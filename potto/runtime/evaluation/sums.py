@@ -16,7 +16,7 @@ from potto.core.terms import Sum, lam
 from potto.diagnostics import PottoError
 from potto.kernels import errors
 from potto.kernels.cells import Cell, Number, Rows, Trace, Value, all_arrays, combined, listed, map_arrays, map_cells
-from potto.kernels.whole import UNIT_ROUNDOFF
+from potto.kernels.whole import LARGEST, SHORT, UNIT_ROUNDOFF, looked_through
 from potto.runtime.evaluation.machine import Machine
 from potto.runtime.evaluation.selection import Pick, apart
 
@@ -42,7 +42,8 @@ def total(machine: Machine, term: Sum, lo: Value, hi: Value, env: dict[str, Valu
         here = {n: map_cells(wide[n], lambda cell: Cell(cell.v)) for n in place.free}
         wide[term.variable] = _around(machine, machine.with_directions(0).term(place, here), int(first), int(last))
         return _reduce(machine.run(body, [wide[p] for p in params], None), shape, REACH)
-    if machine.linker.inexact(term.body):  # it integrates
+    integrates = machine.linker.inexact(term.body)
+    if integrates:
         found = machine.linker.semantics.culled(machine, term, int(first), int(last), env)
         if found is not None:
             return found
@@ -52,7 +53,8 @@ def total(machine: Machine, term: Sum, lo: Value, hi: Value, env: dict[str, Valu
     for start in range(int(first), int(last) + 1, step):
         index = np.arange(start, min(start + step, int(last) + 1), dtype=float)
         wide[term.variable] = Cell(index, None, (None,) * machine.directions)
-        value = machine.run(body, [wide[p] for p in params], None)
+        with looked_through(0 if integrates else SHORT):
+            value = machine.run(body, [wide[p] for p in params], None)
         part = _reduce(value, shape, index.size)
         result = part if result is None else _plus(result, part)
     assert result is not None
@@ -122,7 +124,10 @@ def _reduce(value: Value, shape: tuple[int, ...], count: int) -> Value:
 
     found = combined(part, value)
     assert isinstance(found, Cell)
-    rounding = 8 * UNIT_ROUNDOFF * part(np.abs(value.v))
+    size = part(np.abs(value.v))
+    rounding = 8 * UNIT_ROUNDOFF * size
+    if np.size(value.v) <= SHORT and np.all(size <= LARGEST) and np.all(np.rint(value.v) == value.v):
+        rounding = 0.0  # whole numbers: nothing is rounded off
     return Cell(found.v, rounding if found.e is None else found.e + rounding, found.t, found.et)
 
 
