@@ -23,8 +23,10 @@ def strip(a, b, t) integral [a, a + b/16] cos(x)*[x >= t] d(x)
 def moving(a, b, t) integral ([a, a + t/16], [b, b + 1/16]) x*y d(x, y)
 def turned(a, b, t) integral ([a + 1/16, a], [b, b + 1/16]) exp(x*y)*[x + 2*y >= t] d(x, y)
 def pair(a, b, t) integral ([a, a + 1/16], [b, b + 1/16]) (x*[x > t], y*t) d(x, y)
+def weighed(p, q, h, w, t) integral ([p, p + h], [q, q + h]) exp(w*x*y)*[x + 2*y >= t] d(x, y)
+def about(a, b, t) weighed(a - 0.1/3, b - 0.1/3, 0.2/3, 1/3, t)
 """
-NAMES = ["line", "saddle", "disc", "root", "peak", "wave", "solid", "strip", "moving", "turned", "pair"]
+NAMES = ["line", "saddle", "disc", "root", "peak", "wave", "solid", "strip", "moving", "turned", "pair", "about"]
 
 
 def picture(name: str, t: float) -> potto.Estimate:
@@ -84,6 +86,24 @@ def f(a, b, t) integral ([a, a + 1/512], [b, b + 1/512]) 1/(x + y + t)^2*[x + y 
     # A few roundings of numbers of this size, on either side.
     assert (np.abs(got.value - value) <= 1e-14 * value).all() and (np.abs(got.tangent - rate) <= 2e-14 * -rate).all()
     assert got.evals == 16 * 64 * 64  # a product of 4 x 4 nodes each, and no cuts
+
+
+@pytest.mark.parametrize("place", ["weighed(a - length(t), b, 1/16, 1, t)", "weighed(a, b, 1/16, length(t), t)"])
+def test_whole_pixels_are_off_by_what_their_bounds_and_parameters_are(place: str) -> None:
+    m = potto.compile(PROGRAM + f"""
+def length(t) integral ([0, 1], [0, 1]) sqrt(abs(x - y*t))/10 d(x, y)
+def f(a, b, t) {place}
+""")
+    a, b = np.meshgrid(np.arange(16) / 16, np.arange(16) / 16)
+    exact = m.f(a, b, 0.7)
+    with potto.settings(rtol=1e-3):
+        found, length = m.f(a, b, 0.7), m.length(0.7)
+    whole = np.abs(a + 2 * b - 0.7) > 0.3  # clear of the line
+    off = np.abs(found.value - exact.value)[whole]
+    assert off.max() > 1e-13 and (off <= (found.error + exact.error)[whole]).all()
+    # Two sides of a pixel move by as much, and what is integrated is at most e^2, and its derivative by a weight 2 e^2
+    # over the pixel: not more than these, or the pixel would be less sure than it is.
+    assert found.error[whole].max() <= 2 * math.e**2 / 16 * length.error + 1e-15
 
 
 def test_only_pixels_that_are_cut_are_cut() -> None:

@@ -22,7 +22,7 @@ from potto.core.kinds import union_of
 from potto.core.terms import Branch, Const, Integral, Lam, Term, Tuple, children, function_of, postorder, tuple_
 from potto.integrate.fixed.box_text import NEAR
 from potto.integrate.fixed.straight import MOST_TERMS, Straight
-from potto.integrate.fixed.tensor_product import Face
+from potto.integrate.fixed.tensor_product import Bounds, Face
 from potto.integrate.pieces import Evaluator, gather, still
 from potto.integrate.rules.intervals import Interval
 from potto.integrate.rules.lowered_intervals import enclosures
@@ -32,14 +32,14 @@ MOST_VARIABLES = 3
 # Members that are enclosed together; and that are done at once, whose numbers stay in the cache.
 RUN, AT_ONCE = 32, 1 << 15
 UNCLEAR = -1  # of sides
+NARROW = 1e3  # times how far its bounds may be off: what is not wider is left to the ways that cut
 
 
 class Sides(Struct, frozen=True):
-    """Of the boxes of members their bounds, (variables, B) each, and their sides: a bit for each surface on which it
-    depends what is integrated, or UNCLEAR."""
+    """Of the boxes of members their bounds and their sides: a bit for each surface on which it depends what is
+    integrated, or UNCLEAR."""
 
-    low: Array
-    high: Array
+    bounds: Bounds
     codes: Ints
 
 
@@ -140,8 +140,9 @@ def _plan(term: Integral, inlined: Term, decided: tuple[Term, ...]) -> Straight:
 
 
 def sides_of(box: Box, machine: Evaluator, env: dict[str, Value], batch: int) -> Sides | None:
-    """On which side of every surface the box of each member lies; None if a bound moves, or has an error."""
-    low, high = np.empty((2, len(box.variables), batch))
+    """On which side of every surface the box of each member lies, wherever its bounds are within their errors; None if
+    a bound moves."""
+    low, high, off = np.empty((3, len(box.variables), batch))
     codes = np.empty(batch, dtype=np.int64)
     for start in range(0, batch, AT_ONCE):
         part = slice(start, min(start + AT_ONCE, batch))
@@ -149,9 +150,10 @@ def sides_of(box: Box, machine: Evaluator, env: dict[str, Value], batch: int) ->
         ends = _ends(box, machine, here, part.stop - start)
         if ends is None:
             return None
-        low[:, part], high[:, part] = ends
-        codes[part] = _codes(box, machine, here, *ends)
-    return Sides(low, high, codes)
+        (low[:, part], high[:, part]), (below, above) = ends
+        off[:, part] = below + above
+        codes[part] = _codes(box, machine, here, low[:, part] - below, high[:, part] + above, off[:, part])
+    return Sides(Bounds(low, high, off if off.any() else None), codes)
 
 
 def dark(face: Term) -> bool:
@@ -160,23 +162,26 @@ def dark(face: Term) -> bool:
 
 
 def _ends(box: Box, machine: Evaluator, env: Mapping[str, Value], batch: int) -> tuple[Array, Array] | None:
-    """The lower and upper bounds of the variables, (variables, B) each; None if one moves, or has an error."""
+    """The lower and upper bounds of the variables, and how far they may be off, (2, variables, B) each; None if one
+    moves."""
     bounds = machine.evaluate(box.bounds, {n: env[n] for n in box.bounds.params}, None)
     assert isinstance(bounds, tuple)
-    ends = np.empty((2, len(box.variables), batch))
+    ends, off = np.empty((2, 2, len(box.variables), batch))
     for number, cell in enumerate(bounds):
         assert isinstance(cell, Cell)
-        if cell.e is not None or any(t is not None for t in cell.t):
+        if any(t is not None for t in cell.t):
             return None  # a bound that moves has boundary terms of its own
         ends[number % 2, number // 2] = cell.v
-    return ends[0], ends[1]
+        off[number % 2, number // 2] = 0.0 if cell.e is None else cell.e
+    return ends, off
 
 
-def _codes(box: Box, machine: Evaluator, env: Mapping[str, Value], low: Array, high: Array) -> Ints:
+def _codes(box: Box, machine: Evaluator, env: Mapping[str, Value], low: Array, high: Array, off: Array) -> Ints:
     """Per member a number whose bits are the sides on which its box lies of the surfaces that the integrand depends on;
-    UNCLEAR where it is not on one side of every surface, or is not finite, or empty."""
+    UNCLEAR where it is not on one side of every surface, or is not finite, or empty, or is next to nothing beside how
+    far its bounds may be off."""
     size = high - low
-    plain: Bools = np.asarray((np.isfinite(size) & (size > 0)).all(axis=0))
+    plain: Bools = np.asarray((np.isfinite(size) & (size > NARROW * off)).all(axis=0))
     codes = np.zeros(plain.size, dtype=np.int64)
     if box.surfaces:
         todo = _by_runs(box, machine, env, low, high, codes)

@@ -46,21 +46,34 @@ class Face(Struct, frozen=True, dict=True, eq=False):
         return tuple(n if n is not None and n <= ORDERS[-1] else None for n in nodes)
 
 
+class Bounds(Struct, frozen=True):
+    """Of boxes the bounds, (variables, B) each; off: how far both may be off together, None for not at all."""
+
+    low: Array
+    high: Array
+    off: Array | None = None
+
+    def of(self, where: Ints | slice) -> Bounds:
+        """Those of some of the boxes."""
+        return Bounds(self.low[:, where], self.high[:, where], None if self.off is None else self.off[:, where])
+
+
 class Means(Struct, frozen=True):
-    """Mean values over boxes, (m, 1 + k, B), of the integrand and of its size, and per variable the sizes of the
-    Legendre coefficients along it, (m, 1 + k, n, B)."""
+    """Mean values over boxes, (m, 1 + k, B), of the integrand, of its size and of its own error, and per variable the
+    sizes of the Legendre coefficients along it, (m, 1 + k, n, B)."""
 
     number: Array
     most: Array
+    own: Array
     along: list[Array]
 
 
 def integrated(
-    face: Face, machine: Evaluator, env: dict[str, Value], index: Ints, low: Array, high: Array
+    face: Face, machine: Evaluator, env: dict[str, Value], index: Ints, bounds: Bounds
 ) -> Iterator[tuple[Ints, Sums]]:
     """The integrals over those boxes that a rule does for, some at a time: which, and their sums.
 
-    index: of the boxes, among the members of `env`; low, high: (variables, B), the bounds of all members.
+    index: of the boxes, among the members of `env`; bounds: of all members.
     """
     given = {name: env[name] for name in face.function.params if name in env}
     for orders in dict.fromkeys(tuple(order if n is None else n for n in face.exact) for order in ORDERS):
@@ -70,10 +83,7 @@ def integrated(
             machine.count(some.size * math.prod(orders))
             span = run_of(some)
             where = some if span is None else span
-            found = _at_nodes(face, machine, gather(given, where), low[:, where], high[:, where], orders)
-            if found is None:
-                return
-            sums, good = found
+            sums, good = _at_nodes(face, machine, gather(given, where), bounds.of(where), orders)
             if good.all():
                 yield some, sums
             else:
@@ -95,23 +105,23 @@ def _tensor(orders: tuple[int, ...]) -> tuple[tuple[Array, ...], tuple[Array, ..
 
 
 def _at_nodes(
-    face: Face, machine: Evaluator, env: dict[str, Value], low: Array, high: Array, orders: tuple[int, ...]
-) -> tuple[Sums, Bools] | None:
-    """A rule at all of its nodes at once; None where values have errors of their own."""
-    size = high - low
+    face: Face, machine: Evaluator, env: dict[str, Value], bounds: Bounds, orders: tuple[int, ...]
+) -> tuple[Sums, Bools]:
+    """A rule at all of its nodes at once, and for which boxes it does."""
+    low, size = bounds.low, bounds.high - bounds.low
     volume = size.prod(axis=0)
     found = _means(face, machine, env, low, size, orders)
-    if found is None:
-        return None
     number, most = found.number, found.most
-    error, floor = np.zeros(number.shape), 4 * EPS * most
+    error, floor = np.zeros(number.shape), 4 * EPS * most + found.own
     for variable, (n, mean) in enumerate(zip(face.exact, found.along, strict=True)):
         slopes = gauss(mean.shape[2]).slopes
         if n is None:
             error += truncation(mean.swapaxes(2, 3))
         if slopes.any():
-            far = np.maximum(np.abs(low[variable]), np.abs(high[variable])) / size[variable]
+            far = np.maximum(np.abs(low[variable]), np.abs(bounds.high[variable])) / size[variable]
             floor += (slopes @ mean) * np.minimum(NODE_ROUNDING * EPS * far, 1.0)
+        if bounds.off is not None:  # at a bound the integrand is at most what its coefficients add up to
+            floor += mean.sum(axis=2) * (bounds.off[variable] / size[variable])
     asked = np.maximum(0.5 * machine.rtol * np.abs(number), 0.5 * machine.atol / volume)
     good: Bools = (error <= np.maximum(asked, 8 * floor)).all(axis=(0, 1))
     error += floor
@@ -122,29 +132,29 @@ def _at_nodes(
 
 def _means(
     face: Face, machine: Evaluator, env: dict[str, Value], low: Array, size: Array, orders: tuple[int, ...]
-) -> Means | None:
-    """What the nodes of a rule amount to; None for values with errors of their own."""
+) -> Means:
+    """What the nodes of a rule amount to."""
     nodes, weights = _tensor(orders)
     here, count = dict(env), low.shape[1]
     for variable, x, a, b in zip(face.plan.variables, nodes, low, size, strict=True):
         here[variable] = Cell(a + b * x, None, (None,) * machine.directions)
     value = machine.evaluate(face.function, {name: here[name] for name in face.function.params}, None)
     cells = components(value)
-    if any(cell.e is not None or any(x is not None for x in cell.et) for cell in cells):
-        return None
     shape = (len(cells), 1 + machine.directions)
-    number, most = np.zeros((*shape, count)), np.zeros((*shape, count))
+    number, most, own = np.zeros((3, *shape, count))
     along = [np.zeros((*shape, n, count)) for n in orders]
     for i, cell in enumerate(cells):
-        for c, values in enumerate((cell.v, *cell.t)):
+        for c, (values, off) in enumerate(zip((cell.v, *cell.t), (cell.e, *cell.et), strict=True)):
             if values is None:
                 continue
             h: Array = np.broadcast_to(values, (nodes[0].size, count))
             most[i, c] = weights[0] @ np.abs(h)
+            if off is not None:
+                own[i, c] = weights[0] @ np.broadcast_to(off, h.shape)
             for n, rest, mean in zip(orders, weights[1:], along, strict=True):  # one after another, outermost first
                 coefficients = gauss(n).transform.T @ h.reshape(n, -1)
                 sizes = np.abs(coefficients).reshape(n, rest.size, count)
                 mean[i, c] = sizes[:, 0] if rest.size == 1 else rest @ sizes
                 h = coefficients[0].reshape(rest.size, count)
             number[i, c] = h[0]
-    return Means(number, most, along)
+    return Means(number, most, own, along)

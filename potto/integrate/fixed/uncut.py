@@ -86,7 +86,7 @@ def _of_face(
         ways = ()
     if index.size:
         with _rented(ways):
-            yield from list(integrated(face, machine, env, index, sides.low, sides.high))
+            yield from list(integrated(face, machine, env, index, sides.bounds))
 
 
 # By machine code
