@@ -90,10 +90,8 @@ def f(a, b, t) integral ([a, a + 1/512], [b, b + 1/512]) 1/(x + y + t)^2*[x + y 
 
 @pytest.mark.parametrize("place", ["weighed(a - length(t), b, 1/16, 1, t)", "weighed(a, b, 1/16, length(t), t)"])
 def test_whole_pixels_are_off_by_what_their_bounds_and_parameters_are(place: str) -> None:
-    m = potto.compile(PROGRAM + f"""
-def length(t) integral ([0, 1], [0, 1]) sqrt(abs(x - y*t))/10 d(x, y)
-def f(a, b, t) {place}
-""")
+    length = "def length(t) integral ([0, 1], [0, 1]) sqrt(abs(x - y*t))/10 d(x, y)"
+    m = potto.compile(f"{PROGRAM}{length}\ndef f(a, b, t) {place}\n")
     a, b = np.meshgrid(np.arange(16) / 16, np.arange(16) / 16)
     exact = m.f(a, b, 0.7)
     with potto.settings(rtol=1e-3):
