@@ -44,7 +44,7 @@ class TwoSided(Event, frozen=True):
     """Why derivatives on the two sides differ: a surface lies on a bound of a variable, or on another surface.
 
     fold: or its sections along the variable appear or merge just here. Without a surface: some run along the variable.
-    kink: the integrand has a kink where the surface is, all along the variable; without one, it is a number's.
+    along: or it is there all along the variable. kink: it is a kink of the integrand's; without a variable, a number's.
     hidden: rounding hides whether the surface lies there, and what that changes is part of the errors.
     """
 
@@ -54,6 +54,15 @@ class TwoSided(Event, frozen=True):
     fold: bool = False
     kink: bool = False
     hidden: bool = False
+    along: bool = False
+
+
+class Along(Event, frozen=True):
+    """A surface is 0 all along a stretch of a variable, and moves there: a little beside the parameters all of the
+    stretch is on one of its sides, or it has sections there."""
+
+    variable: str
+    surface: Term
 
 
 class Fold(Event, frozen=True):

@@ -31,6 +31,7 @@ from potto.runtime.evaluation.folds import fold
 from potto.runtime.evaluation.functions import Closure, Derivative
 from potto.runtime.evaluation.kinks import note_kink
 from potto.runtime.evaluation.machine import Linker, Machine, Record, Semantics
+from potto.runtime.evaluation.record import BOXES_FOR_EVALUATIONS
 from potto.runtime.evaluation.selection import chosen, lazy
 from potto.runtime.evaluation.sums import total
 
@@ -83,7 +84,7 @@ class Program:
         self._direct: dict[Term, Direct | Around | None] = {}
 
     def machine(self, settings: Settings) -> Machine:
-        record = Record()
+        record = Record(most_boxes=settings.max_evals // BOXES_FOR_EVALUATIONS)
         if record.gauge is not None:
             record.gauge.most = settings.max_evals
         return Machine(self.linker, settings, record)
@@ -269,7 +270,9 @@ def _notes(record: Record) -> list[OneSided]:
         other = None if what.other is None else f"{format_term(what.other)} = 0"
         surface = None if what.surface is None else f"{format_term(what.surface)} = 0"
         backward, forward, before, beyond = map(np.squeeze, edge.sides)
-        note = OneSided(what.variable, surface, backward, forward, other, what.fold, before, beyond, what.kink)
+        note = OneSided(
+            what.variable, surface, backward, forward, other, what.fold, before, beyond, what.kink, what.along
+        )
         if not any((o.surface, o.variable, o.other) == (surface, what.variable, other) for o in out):
             out.append(note)
     return out

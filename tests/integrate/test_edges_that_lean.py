@@ -58,11 +58,9 @@ def test_two_triangles_of_a_mesh_share_it() -> None:
         assert found.converged and abs(float(found.tangent)) < 1e-14
 
 
-@pytest.mark.xfail(strict=True, reason="which of the two is in front is read off one place of the other variable")
 def test_two_edges_that_cross_within_rounding() -> None:
     """x < -1/8 - (t + 1/4)/2 binds where y < 0, and the other edge where y > 0: a little to the left or to the right of
     t it is the one or the other all along, so that the derivative is -1 or 0 there, and -1/2 between."""
     edges = "[2*x < -0.5 - t]*[2*x + 1.1102230246251565e-16*y < -0.25]"
     found = potto.deriv(potto.compile(f"def f(t) integral ([-1, 1], [-1, 1]) {edges} d(x, y)").f)((-0.25, 1.0))
-    noted = [float(side) for note in found.notes for side in (note.backward, note.forward)]
-    assert abs(found.tangent + 0.5) <= found.tangent_error or sorted(noted) == pytest.approx([-1.0, 0.0], abs=1e-9)
+    assert abs(found.tangent + 0.5) <= found.tangent_error

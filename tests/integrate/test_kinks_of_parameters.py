@@ -13,7 +13,8 @@ import pytest
 
 import potto
 
-PI, ROOT = math.pi, 0.6823278038280193
+PI, ROOT, ROOT_OF_THIRD = math.pi, 0.6823278038280193, math.sqrt(1 / 3)
+HALF = "integral ([-1, 1], [0, 1])"
 SQUARE, BOX = "integral ([-1, 1], [-1, 1])", "integral ([-1, 1], [-1, 1], [-1, 1])"
 UNIT, CUBE = "integral ([0, 1], [0, 1])", "integral ([0, 1], [0, 1], [0, 1])"
 PLANE, SPACE = "integral ([-2, 2], [-2, 2])", "integral ([-2, 2], [-2, 2], [-2, 2])"
@@ -77,6 +78,19 @@ KINKS = [
     (f"{PLANE} {DISC}*[x^2 + t*y^2 < 1] d(x, y)", 1.0, 0, -PI / 2),
     (f"{SPACE} {BALL}*[x^2 + (y - t)^2 + z^2 < 1] d(x, y, z)", 0.0, PI, -PI),
     (f"{SPACE} {BALL}*[x^2 + y^2 + (z - t)^2 < 1] d(x, y, z)", 0.0, PI, -PI),
+    # which of two is the faster one changes where nothing is cut: int max(1, 2 y) = 5/4, int min(1, 2 y) = 3/4
+    (f"{HALF} [x > t or x > 2*t*y] d(x, y)", 0.0, -1.25, -0.75),
+    (f"{HALF} [x > t]*[x > 3*t*y^2] d(x, y)", 0.0, -1 + 2 / 3 * ROOT_OF_THIRD, -1 - 2 / 3 * ROOT_OF_THIRD),
+    # conditions, or kinks in them, that are equalities all along
+    (f"{HALF} [max(x - t, x - 2*t*y) > 0] d(x, y)", 0.0, -1.25, -0.75),
+    ("integral ([0, 1], [-1, 1]) [max(y - t, y - 2*t*x) > 0] d(x, y)", 0.0, -1.25, -0.75),
+    (f"{HALF} [x + max(y*t, 2*t) <= 0]*y d(x, y)", 0.0, -1 / 3, -1),
+    # the value is another one on one side
+    ("integral [0, 1] [x*t <= 0] d(x)", 0.0, 0, -math.inf),
+    ("integral [0, 1] [x*t < 0] d(x)", 0.0, -math.inf, 0),
+    ("integral [0, 1] [x*t <= 2*t] d(x)", 0.0, math.inf, 0),
+    (f"{UNIT} [(x + y^2)*t <= 0]*y d(x, y)", 0.0, 0, -math.inf),
+    ("integral [0, 1] exp(integral [0, 1] [x*y*t <= 0]*y d(y)) d(x)", 0.0, 0, -math.inf),
 ]  # fmt: skip
 
 
@@ -95,10 +109,13 @@ def test_both_derivatives_are_told(program: str, t: float, backward: float, forw
     assert low - 1e-9 <= answer.tangent <= high + 1e-9  # one of them, or what lies between, as conditions fall
 
 
-@pytest.mark.xfail(strict=True, reason="a kink in a condition is lifted out of it as one of its sides")
-def test_a_kink_in_a_condition_that_lies_all_along_its_surface() -> None:
-    told = rate("integral ([-1, 1], [0, 1]) [max(x - t, x - 2*t*y) > 0] d(x, y)", 0.0).notes
-    assert [(float(note.backward), float(note.forward)) for note in told] == [pytest.approx((-1.25, -0.75))]
+@pytest.mark.parametrize("program", ["integral [-1, 1] [x*t <= 0] d(x)", "integral [-1, 1] [max(x, 0)*t < t^2] d(x)"])
+def test_where_the_value_is_another_one_on_both_sides_there_is_no_derivative(program: str) -> None:
+    answer = rate(program, 0.0)
+    assert not answer.converged and answer.tangent_error == math.inf
+    (note,) = answer.notes
+    assert np.isinf([note.backward, note.forward]).all() and note.backward != note.forward
+    assert "lies all along `x`" in str(note)
 
 
 @pytest.mark.parametrize("program", ["abs(t)", "integral [0, 1] abs(x*t) d(x)", f"{SQUARE} max(x + t*y, x) d(x, y)"])
@@ -113,6 +130,8 @@ def test_the_other_way_the_sides_are_turned_round(program: str) -> None:
     ("abs(t) + abs(t - 1)", 0.3, 0.0),
     ("max(t, 0) - max(0, -t)", 0.0, 1.0),  # max(t, 0) + min(t, 0) = t
     ("max(t, 0) + min(t, 0)", 0.0, 1.0),
+    ("integral [0, 1] [x*t <= 0 or x < 2] d(x)", 0.0, 0.0),
+    (f"{HALF} ([x > t] + [x > 2*t*y]) d(x, y)", 0.0, -2.0),
     ("abs(0*t) + t", 0.0, 1.0),
     ("integral [0, 1] (max(x*t, 0) + min(x*t, 0)) d(x)", 0.0, 0.5),
     ("integral [0, 1] abs(x - t) d(x)", 0.25, -0.5),

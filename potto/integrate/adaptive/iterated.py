@@ -24,6 +24,7 @@ from potto.integrate.degenerate.coincidences import Scene, count_places, count_s
 from potto.integrate.degenerate.degeneracies import beneath, brush
 from potto.integrate.degenerate.empty_ranges import Collapsed, collapsed_ranges, count_collapsed
 from potto.integrate.degenerate.faces import Face
+from potto.integrate.degenerate.kinks import note_flat
 from potto.integrate.degenerate.narrow_panels import count_narrow
 from potto.integrate.degenerate.undefined import lost_members, sides_at
 from potto.integrate.events import UNSEEN_MEETING, sides_hidden
@@ -240,6 +241,7 @@ class Iteration(Struct):
             return Settled(sides)
         unsure: dict[int, Bools] = {}
         undefined: dict[int, Bools] = {}
+        flat: dict[int, Bools] = {}
         values = sides_at(level, scene.env, seg, scene.machine)
         for group, (at_middle, off), turned in zip(level.decided, values, level.turned, strict=True):
             if any(outer not in sides for outer in turned) or (self.face is not None and group == self.face.group):
@@ -252,6 +254,10 @@ class Iteration(Struct):
                 undefined[group] = np.isnan(at_middle)
             if (hidden := np.abs(at_middle) < off).any():
                 unsure[group] = hidden
+            if (zero := (at_middle == 0) & ~hidden).any():
+                flat[group] = zero
+        if flat and scene.machine.directions and not (scene.machine.side or scene.machine.frozen):
+            note_flat(scene, seg, flat)
         if not unsure:
             return Settled(sides, undefined)
         wide = seg.b - seg.a > NARROW * np.bincount(seg.owner, seg.b - seg.a)[seg.owner]

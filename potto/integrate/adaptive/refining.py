@@ -49,7 +49,11 @@ def integrated(work: PanelBatch) -> Sums:
     work.seg = paced(work)
     ends = work.ends = work.end_values()
     whole = Pieces(np.arange(count), zero, one, np.zeros(count, dtype=np.int64))
-    fresh = work.measure(whole, work.enough() or work.parent.order, True)
+    work.exact = work.enough()
+    fresh = work.measure(whole, work.exact or work.parent.order, True)
+    if work.exact and not work.enough():  # surfaces were met that coincide
+        work.exact = None
+        fresh = work.measure(whole, work.parent.order, True)
     if work.last and work.parent.extent is not None:
         size = fresh.size.reshape(work.width, -1, fresh.segment.size)[:, 0].max(axis=0)
         work.parent.extent.saw_values(size / (work.seg.b - work.seg.a), work.below(work.seg.owner))

@@ -9,7 +9,7 @@ integrated is continuous there; where it is not, they do as the implicit functio
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -46,7 +46,7 @@ def critical_rows(level: LevelPlan, env: dict[str, Value], lo: Cell, hi: Cell, b
     rows: list[Row] = []
     for system in level.level.critical:
         beyond = around if system.turning else 0.0
-        found = _places(system, level.variable, env, low - beyond, high + beyond)
+        found = _places(system, level.variable, env, low - beyond, high + beyond, machine)
         if found is None:
             machine.note(Unsearched(level.variable))
             continue
@@ -82,7 +82,7 @@ def _speeds(
 
 
 def _places(
-    system: Critical, variable: str, env: dict[str, Value], low: Array, high: Array
+    system: Critical, variable: str, env: dict[str, Value], low: Array, high: Array, machine: Any
 ) -> tuple[Ints, Array, Array] | None:
     """Whose the solutions are, where (n, P), and how far off along what is cut; None if not all are known."""
     slopes = slopes_of(system, variable)
@@ -101,7 +101,7 @@ def _places(
             return None
         fixed[name] = as_array(value.v, low.size)
     search = _Search(names, fixed, terms[:n], terms[n : n + n * n], terms[n + n * n :])
-    return search.solved(low, high)
+    return search.solved(low, high, machine.search)
 
 
 def _none(n: int) -> tuple[Ints, Array, Array]:
@@ -118,10 +118,10 @@ class _Search(Struct):
     ends: Sequence[Term]
     found: list[tuple[Ints, Array, Array]] = []
 
-    def solved(self, low: Array, high: Array) -> tuple[Ints, Array, Array] | None:
+    def solved(self, low: Array, high: Array, within: Callable[[int], bool]) -> tuple[Ints, Array, Array] | None:
         """Whose the solutions are, where they are, and how far off along the variable that is cut.
 
-        None where there are too many boxes.
+        None where there are too many boxes. within: whether so many more of them are within the budget.
         """
         owner, box = self.whole(low, high)
         most = max(BOXES, BOXES_EACH * low.size)
@@ -129,7 +129,7 @@ class _Search(Struct):
         for _ in range(ROUNDS):
             if not owner.size:
                 break
-            if owner.size > most:
+            if owner.size > most or not within(owner.size):
                 return None
             owner, box = self.narrowed(owner, box)
             narrow = ~(box[0, 1] - box[0, 0] > np.maximum(tiny[owner], 4 * EPS * np.abs(box[0]).max(axis=0)))

@@ -1,16 +1,21 @@
-"""Kinks that lie all along a stretch of the domain: |x*t| at t = 0, max(x + t*y, x). There is no place to cut at.
+"""Kinks and surfaces that lie all along a stretch of the domain: |x*t|, or [x*t <= 0], at t = 0, max(x + t*y, x).
 
-Owns `lying_along`. Where such a kink moves, the integrand has two derivatives throughout the stretch.
+Owns `lying_along` and `note_flat`. There is no place to cut at. Where such a kink moves, the integrand has two
+derivatives throughout the stretch; where such a surface does, the stretch is on one of its sides, or is cut, at once.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from potto.integrate.degenerate.coincidences import CLEAR
+from potto.integrate.degenerate.coincidences import CLEAR, Scene
+from potto.integrate.degenerate.undefined import LOOKED_AT
+from potto.integrate.events import Along
 from potto.integrate.pieces import Evaluator, components, gather, still
 from potto.integrate.plan import Plan
-from potto.kernels.cells import Array, Cell, Ints, Value, pad
+from potto.integrate.rules import substitution
+from potto.integrate.rules.substitution import Segments
+from potto.kernels.cells import Array, Bools, Cell, Ints, Value, pad
 
 # At how many places each of a few members is looked at, and each of many: what takes up less of the domain is missed.
 PLACES, FEW_PLACES, MANY = 16, 4, 64
@@ -34,15 +39,41 @@ def lying_along(plan: Plan, env: dict[str, Value], batch: int, machine: Evaluato
     found = quiet.evaluate(plan.kinks, {n: here[n] for n in plan.kinks.params}, None)
     met = []
     for number, kink in enumerate(components(found)):
-        moves = np.zeros(owner.shape, dtype=bool)
-        for t, et in zip(kink.t, kink.et or (None,) * len(kink.t), strict=True):
-            if t is not None:
-                moves |= np.abs(t) > CLEAR * (0.0 if et is None else et)
-        there = (np.abs(kink.v) <= CLEAR * (0.0 if kink.e is None else kink.e)) & moves
+        there = (np.abs(kink.v) <= CLEAR * (0.0 if kink.e is None else kink.e)) & _moves(kink, owner.size)
         members = np.unique(owner[np.broadcast_to(there, owner.shape)])
         if members.size:
             met.append((number, members))
     return met
+
+
+def note_flat(scene: Scene, seg: Segments, flat: dict[int, Bools]) -> None:
+    """Say which surfaces lie all along segments, and move there. flat: by group, the segments on which it is 0 wherever
+    it was looked at."""
+    level, machine = scene.level, scene.machine
+    index = np.nonzero(np.any(list(flat.values()), axis=0))[0]
+    owner = seg.owner[index]
+    env = gather({n: scene.env[n] for n in level.surfaces.params if n in scene.env}, owner)
+    moves = np.zeros((len(level.decided), owner.size), dtype=bool)
+    for share in LOOKED_AT:
+        x, _, _ = substitution.points(seg.pick(index), np.full((index.size, 1), share))
+        here = {n: pad(v, machine.directions) for n, v in {**env, level.variable: Cell(x[:, 0])}.items()}
+        values = machine.tracking().evaluate(level.surfaces, {n: here[n] for n in level.surfaces.params}, None)
+        moves |= np.stack([_moves(value, owner.size) for value in components(values)])
+    for group, along in zip(level.decided, moves, strict=True):
+        there = owner[along & flat[group][index]] if group in flat else owner[:0]
+        there = there[scene.counted(there)]
+        if there.size:
+            surface = scene.parent.plan.groups[group].cut.surface
+            machine.note(Along(level.variable, surface), scene.below(there))
+
+
+def _moves(value: Cell, count: int) -> Bools:
+    """Where a number moves in any direction, by more than rounding."""
+    moves = np.zeros(count, dtype=bool)
+    for t, et in zip(value.t, value.et or (None,) * len(value.t), strict=True):
+        if t is not None:
+            moves |= np.abs(t) > CLEAR * (0.0 if et is None else et)
+    return moves
 
 
 def _between(lo: Array, hi: Array, part: Array) -> Array:

@@ -12,7 +12,7 @@ import numpy as np
 from msgspec import Struct
 
 from potto.integrate.columns import distinct
-from potto.integrate.events import BUDGET_SPENT
+from potto.integrate.events import BUDGET_SPENT, TwoSided
 from potto.integrate.levels import LevelPlan
 from potto.integrate.panels.iterated import Iterated
 from potto.integrate.panels.mending import mend
@@ -52,6 +52,7 @@ class PanelBatch(Struct, dict=True):
     steps: Crossing | None = None  # what crosses faces at which cuts only bends were expected
     misplaced: Array | None = None  # (m, k, S) what the rounding of the ends of segments means for the fixed form
     at_ends: Array | None = None  # (2, m, 2, S) the integrand and its slope at the ends of segments
+    exact: int | None = None  # how many nodes do, where that is known
 
     def __post_init__(self) -> None:
         self.k = self.machine.directions
@@ -71,8 +72,11 @@ class PanelBatch(Struct, dict=True):
 
     def enough(self) -> int | None:
         """How many nodes do for an integrand that is a polynomial between its cuts: so many that it is 0 where it is 0
-        at all of them, since they also tell its size. Where nodes round to others than the rule's, more average out."""
+        at all of them, since they also tell its size. Where nodes round to others than the rule's, more average out.
+        Not where surfaces coincide further in: the faster one binds, and which one that is changes where no cut is."""
         if not self.last and few_doubles(self.seg, (self.seg.b - self.seg.a)[:, None]):
+            return None
+        if not self.last and self.k and (self.machine.side or self.machine.events.every(TwoSided)):
             return None
         degrees = self.parent.degrees
         degree = degrees[self.number] if degrees and not self.seg.kind.any() else None
@@ -131,8 +135,7 @@ class PanelBatch(Struct, dict=True):
         coefficients = h @ rule.transform
         size, height = np.abs(coefficients), np.abs(h)
         p.integral = coefficients[..., 0]
-        exact = self.enough()
-        if exact is None or rule.nodes.size < exact:
+        if self.exact is None or rule.nodes.size < self.exact:
             p.error = truncation(size, (seg.kind != substitution.LINEAR) & ((p.u0 == 0) | (p.u1 == 1)))
         else:
             p.error = np.zeros(size.shape[:-1])

@@ -38,8 +38,9 @@ class OneSided(Struct, frozen=True):
     """A surface lies on an edge of the domain, or on another surface that moves otherwise, or folds just here.
 
     The derivatives on the two sides of the parameters differ, or are infinite. other: the other surface, if there is
-    one. fold: whether sections of the surface along the variable appear or merge here. kink: whether it is a builtin
-    that has a kink there, all along the variable, or, where that is empty, in a number outside of integrals.
+    one. fold: whether sections of the surface along the variable appear or merge here. along: whether it is 0 all along
+    the variable. kink: whether it is a builtin that has a kink there; without a variable, in a number outside of
+    integrals.
     backward_error, forward_error: how far off they may be.
     """
 
@@ -52,15 +53,16 @@ class OneSided(Struct, frozen=True):
     backward_error: Any = 0.0
     forward_error: Any = 0.0
     kink: bool = False
+    along: bool = False
 
     def __str__(self) -> str:
         which = f"the surface {self.surface}"
         place = f"lies on a bound of `{self.variable}`" if self.other is None else f"coincides with {self.other}"
         if self.surface is None:
             which, place = "surfaces", f"run along `{self.variable}`"
-        elif self.kink:
-            which = f"the kink {self.surface}"
-            place = f"lies all along `{self.variable}`" if self.variable else "is just here"
+        elif self.kink or self.along:
+            which = f"the {'kink' if self.kink else 'surface'} {self.surface}"
+            place = f"lies all along `{self.variable}`" if self.along else "is just here"
         elif self.fold:
             place = f"folds along `{self.variable}`"
         backward, forward = _number(self.backward, self.backward_error), _number(self.forward, self.forward_error)

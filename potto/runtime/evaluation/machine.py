@@ -264,6 +264,10 @@ class Machine:
             gauge.samplings += share == 0
             gauge.sampled(share, limit)
 
+    def search(self, boxes: int) -> bool:
+        """Note that places are searched for in so many boxes more. Whether that is within the budget."""
+        return self.record.search(boxes)
+
     def exhausted(self) -> bool:
         return self.record.spent > self.settings.max_evals
 

@@ -98,6 +98,12 @@ def _begun() -> Gauge | None:
     return gauge
 
 
+# A box takes as long as 1 to 5 evaluations. Of the catalogue's regions in three variables one takes 157,000 boxes, the
+# others less; where several waves cross it may be tens of millions.
+BOXES_FOR_EVALUATIONS = 8
+MOST_BOXES = 20_000_000 // BOXES_FOR_EVALUATIONS
+
+
 class Record(Struct):
     """What one evaluation has done so far. used: answers of before that it is made of.
 
@@ -106,6 +112,7 @@ class Record(Struct):
     within: the error up to which what cancels is 0 as accurately as asked for, of all or of each of the batch.
     culled: integrals that are 0 for certain, and were not evaluated.
     start, members: how many evaluations had been done before those that count, and for how many members these are.
+    boxes, most_boxes: in how many boxes places have been searched for, and in how many they may be for each member.
     """
 
     evaluations: int = 0
@@ -117,6 +124,8 @@ class Record(Struct):
     within: Any = 0.0
     start: int = 0
     members: int = 1
+    boxes: int = 0
+    most_boxes: int = MOST_BOXES
     integrals: int = 0
     culled: int = 0
     used: dict[tuple[str, str], Value] = {}
@@ -152,12 +161,18 @@ class Record(Struct):
     @contextmanager
     def among(self, members: int) -> Iterator[None]:
         """In this block so many members of the batch are all that there are, with a budget of their own."""
-        kept = self.start, self.members, self.evaluations
-        self.start, self.members = self.evaluations - round(self.spent * members), members
+        kept, boxes = (self.start, self.members, self.evaluations), self.boxes
+        self.boxes, self.start, self.members = 0, self.evaluations - round(self.spent * members), members
         try:
             yield
         finally:
             self.start, self.members = kept[0] + self.evaluations - kept[2], kept[1]
+            self.boxes += boxes
+
+    def search(self, boxes: int) -> bool:
+        """Note that places are searched for in so many boxes more. Whether that may be."""
+        self.boxes += boxes
+        return self.boxes <= self.most_boxes * self.members
 
     def count(self, evaluations: int, most: int) -> None:
         """Note evaluations of integrands, of which so many are allowed for each member of the batch."""

@@ -1,4 +1,4 @@
-"""Derivatives of integrals whose integrand has a kink all along a stretch, just at the parameters: those to both sides.
+"""Derivatives of integrals with a kink, or a surface, all along a stretch, just at the parameters: those to both sides.
 
 Owns `at_kinks`. They are what the derivatives beside the parameters lead to, where there is a place to cut at.
 """
@@ -10,7 +10,7 @@ from msgspec.structs import replace
 
 from potto.core.terms import children
 from potto.integrate.degenerate.kinks import lying_along
-from potto.integrate.events import INNER, Fold, OneSidedDerivatives, TwoSided
+from potto.integrate.events import BOUNDLESS, INNER, Along, Fold, OneSidedDerivatives, TwoSided
 from potto.integrate.pieces import Sums
 from potto.kernels.cells import Ints
 from potto.runtime.integration.one_sided import beside, parameter_step
@@ -26,18 +26,37 @@ def at_kinks(problem: Problem, sums: Sums) -> Sums:
     machine = problem.machine
     if not machine.directions or machine.side or machine.frozen:
         return sums
-    plan = problem.plan()
-    if not children(plan.kinks.body) or machine.exhausted():
-        return sums
-    for number, members in lying_along(plan, problem.env, problem.batch, machine):
-        kink = children(plan.kinks.body)[number]
-        variable = next((v for v in reversed(problem.term.variables) if v in kink.free), problem.term.variables[-1])
-        cause = TwoSided(variable, kink, kink=True)
+    found = _surfaces(problem)
+    if children(problem.plan().kinks.body) and not machine.exhausted():
+        found += _kinks(problem)
+    for cause, members in found:
         if problem.outermost:
             sums = _noted(problem, sums, cause, members)
         else:
             machine.note(Fold(cause, INNER, 0, 0.0, None), members)
     return sums
+
+
+def _surfaces(problem: Problem) -> list[tuple[TwoSided, Ints]]:
+    """The surfaces that lie along a stretch, as quadrature has met them, each for members that none before it has."""
+    met, found = np.zeros(problem.batch, dtype=bool), []
+    for event, members in problem.events.every(Along):
+        mask = np.zeros(problem.batch, dtype=bool)
+        mask[slice(None) if members is None else members] = True
+        if (fresh := np.nonzero(mask & ~met)[0]).size:
+            found.append((TwoSided(event.variable, event.surface, along=True), fresh))
+        met |= mask
+    problem.events.forget(Along)
+    return found
+
+
+def _kinks(problem: Problem) -> list[tuple[TwoSided, Ints]]:
+    plan, found = problem.plan(), []
+    for number, members in lying_along(plan, problem.env, problem.batch, problem.machine):
+        kink = children(plan.kinks.body)[number]
+        variable = next((v for v in reversed(problem.term.variables) if v in kink.free), problem.term.variables[-1])
+        found.append((TwoSided(variable, kink, kink=True, along=True), members))
+    return found
 
 
 def _noted(problem: Problem, sums: Sums, cause: TwoSided, members: Ints) -> Sums:
@@ -49,15 +68,21 @@ def _noted(problem: Problem, sums: Sums, cause: TwoSided, members: Ints) -> Sums
             if step is None or len(problem.term.variables) > MOST_VARIABLES:
                 sides[:, :, d] = 0.0 if step is None else np.nan
                 continue
-            (backward, before), (forward, beyond) = (beside(some, d, sign * step) for sign in (-1.0, 1.0))
+            here = sums.pick(members)
+            (backward, before), (forward, beyond) = (beside(some, d, sign * step, here) for sign in (-1.0, 1.0))
         sides[:, :, d] = backward, forward, before, beyond
     backward, forward, before, beyond = sides
     with np.errstate(invalid="ignore"):
         same = np.abs(forward - backward) <= SAME * (np.abs(forward) + np.abs(backward)) + before + beyond
+        same &= np.isfinite(forward) & np.isfinite(backward)
         wrong = same & ~(np.abs(t[..., members] - forward) <= SAME * np.abs(forward) + beyond + et[..., members])
     differ = np.nonzero(~same.all(axis=(0, 1)))[0]
     if differ.size:
         problem.events.note(OneSidedDerivatives(cause, *sides[..., differ]), members[differ])
+    endless = np.isinf(forward) & np.isinf(backward)
+    if endless.any():
+        problem.machine.note(BOUNDLESS, members[endless.any(axis=(0, 1))])
+    et[..., members] = np.where(endless, np.inf, et[..., members])
     t[..., members] = np.where(wrong, forward, t[..., members])
     et[..., members] = np.where(wrong, before + beyond, et[..., members])
     return replace(sums, t=t, et=et)

@@ -43,6 +43,7 @@ TOGETHER = 1e-9
 # The part of a derivative, or how many errors of the value, its error may be that no other order is tried.
 ROUGH, ROUNDED = 1e-9, 1e4
 GAP = 1e-8  # the part of a derivative from which on it is worth a look whether it has two sides that rounding hides
+LEAP = 1e-9  # the part of a value that is no jump of it
 MOST_MEMBERS = 16  # of a batch that are looked at
 # Member, direction, the derivatives before and behind the parameters, of all components, and how far off each may be.
 Sides = tuple[int, int, Array, Array, tuple[Array, Array]]
@@ -105,7 +106,7 @@ def beside_folds(problem: Problem, plan: Plan, sums: Sums) -> None:
     found = [
         (fold.cause, side)
         for fold, _ in events.every(Fold)
-        for side in _sides(problem, plan, fold.owner or range(problem.batch), fold)
+        for side in _sides(problem, plan, fold.owner or range(problem.batch), fold, sums)
     ]
     for cause, (member, d, backward, forward, off) in found:
         t, et = sums.t[:, d, member], sums.et[:, d, member]
@@ -131,7 +132,7 @@ def beside_axes(problem: Problem, plan: Plan, sums: Sums, variable: str) -> bool
     if batch > MOST_MEMBERS:
         return False
     problem.events.forget(Degenerate)
-    found = list(_sides(problem, plan, range(batch), None))
+    found = list(_sides(problem, plan, range(batch), None, sums))
     resting = sum(not any(moving(v, d) for v in problem.env.values()) for d in range(machine.directions))
     if len(found) + batch * resting < batch * machine.directions:
         return False
@@ -163,26 +164,34 @@ def _same(backward: Array, forward: Array, off: Array) -> bool:
     return bool((near | (backward == forward)).all())
 
 
-def _sides(problem: Problem, plan: Plan, members: Sequence[int], where: Fold | None) -> Iterator[Sides]:
+def _sides(problem: Problem, plan: Plan, members: Sequence[int], where: Fold | None, sums: Sums) -> Iterator[Sides]:
     """What is known of each member and direction in which anything moves."""
     for member in members[:MOST_MEMBERS]:
-        one = problem.member(member)
+        one, here = problem.member(member), sums.pick(np.array([member]))
         for d in range(problem.machine.directions):
             step = _step(one, plan, d, where)
             if step is not None:
-                (backward, before), (forward, behind) = (beside(one, d, sign * step) for sign in (-1.0, 1.0))
+                (backward, before), (forward, behind) = (beside(one, d, sign * step, here) for sign in (-1.0, 1.0))
                 yield member, d, backward[:, 0], forward[:, 0], (before[:, 0], behind[:, 0])
 
 
-def beside(problem: Problem, d: int, step: float) -> tuple[Array, Array]:
-    """The derivatives on the side of the parameters on which a step is, and how far off they may be, (m, B) each."""
+def beside(problem: Problem, d: int, step: float, here: Sums) -> tuple[Array, Array]:
+    """The derivatives on the side of the parameters on which a step is, and how far off they may be, (m, B) each.
+
+    here: what there is at the parameters. Where the values beside them lead to another one it is infinite.
+    """
     steps = [step * CLOSER**i for i in range(3)]
     found = [problem.beside({n: moved(v, h, d) for n, v in problem.env.items()}) for h in steps]
     values = [np.where(np.isfinite(part.et[:, d]), part.t[:, d], np.nan) for part in found]
     noise = np.sum([part.et[:, d] for part in found], axis=0)
     flat = zip(*(x.ravel() for x in (*values, noise)), strict=True)
     limits, missed = (np.reshape(x, noise.shape) for x in zip(*(_limit(*four) for four in flat), strict=True))
-    return limits, np.where(np.isfinite(limits), missed + found[2].et[:, d], 0.0)
+    missed = np.where(np.isfinite(limits), missed + found[2].et[:, d], 0.0)
+    with np.errstate(invalid="ignore"):
+        leap, change = found[2].v - here.v, np.abs(steps[2]) * (np.abs(limits) + missed)
+        sure = found[2].e + here.e + LEAP * (np.abs(here.v) + np.abs(found[2].v))
+        jumps = np.isfinite(limits) & (np.abs(leap) > 2 * change + sure)
+    return np.where(jumps, np.copysign(np.inf, leap * step), limits), np.where(jumps, 0.0, missed)
 
 
 def _step(problem: Problem, plan: Plan, d: int, where: Fold | None) -> float | None:
