@@ -49,7 +49,7 @@ def sample(
     with settings(rtol=rtol or RTOL):
         try:
             estimate = function(**given) if wrt is None else grad(function, [wrt])(**given)
-        except TypeError as error:
+        except (PottoError, TypeError) as error:
             raise NoSamples(str(error)) from None
     if not isinstance(estimate, Estimate):
         raise NoSamples(f"`{name}` needs values for more parameters")

@@ -16,6 +16,7 @@ from potto.calculus.checking.diffeo import exported
 from potto.calculus.checking.guards import unguarded
 from potto.calculus.explanation.explain import describe
 from potto.calculus.explanation.layout import WIDTH, DerivativeText, IntegralText, Show, meets
+from potto.calculus.explanation.readable import in_decimals
 from potto.calculus.inlining.expand import expanded
 from potto.calculus.surfaces.branch_cuts import opened
 from potto.core.printer import format_term
@@ -130,7 +131,7 @@ def _surfaces(db: Database, term: Term) -> dict[str, None]:
            for node in postorder(opened(term)) if isinstance(node, Branch | Delta)]  # fmt: skip
     known = [condition.surface for condition in found]
     readable = [surface for surface in own if not any(isinstance(node, App) for node in postorder(surface))]
-    simplified = map(simplify, (*known, *readable))
+    simplified = (simplify(in_decimals(surface)) for surface in (*known, *readable))
     texts = (format_term(surface) for surface in simplified if not isinstance(surface, Const))  # that crosses nothing
     return dict.fromkeys(f"{_COPY.sub('', text)} = 0" for text in texts)
 

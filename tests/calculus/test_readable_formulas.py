@@ -53,3 +53,13 @@ def test_conditions_that_say_nothing_are_not_shown(program: str, conditions: str
     shown = str(derivative_facts(library.db, file, "f"))
     assert f"dt*{conditions}" in shown
     assert "0 = 0" not in shown and "0 >= 0" not in shown and "1 = 0" not in shown
+
+
+def test_numbers_are_decimals() -> None:
+    """What a computer makes of 0.3 - 0.2 is 0.09999999999999998."""
+    library = Library()
+    side = "def side(x, a, b) (a - b)*(x - b)\n"
+    file = library.put("<text>", f"{side}def f(t) integral [0, 1] [side(x, 0.3, 0.2) < t]*(0.3 - 0.2) d(x)\n")
+    facts = derivative_facts(library.db, file, "f")
+    assert facts is not None and facts.surfaces == ("t - 0.1*(x - 0.2) = 0",)
+    assert facts.integrals[0].value == "integral [0, 1] [0.1*(x - 0.2) < t]*0.1 d(x)"

@@ -29,6 +29,14 @@ def disc(r) integral ([-1, 1], [-1, 1]) [x^2 + y^2 < r^2] d(x, y)
 #> disc(0.7)
 def plain(t) t
 """
+MESH = """
+def edge(a: (Real*, Real*), b: (Real*, Real*), x, y) (b.x - a.x)*(y - a.y) - (b.y - a.y)*(x - a.x)
+def inside(t: ((Real*, Real*), (Real*, Real*), (Real*, Real*)), x, y)
+    [edge(t.0, t.1, x, y) >= 0 and edge(t.1, t.2, x, y) >= 0 and edge(t.2, t.0, x, y) >= 0]
+def pixel(mesh: [n] ((Real, Real), (Real, Real), (Real, Real)), grey: [n] Real)
+    integral ([0, 1], [0, 1]) sum i in 0..n - 1 (grey[i]*inside(mesh[i], x, y)) d(x, y)
+def light(c) pixel([((0, 0), (c, 0), (c, c)), ((0, 0), (c, c), (0, c))], [1, 0.5])
+"""
 DRIVER = Path(__file__).with_name("browser.mjs")
 PLAYWRIGHT = Path(__file__).parents[2] / "editors/vscode/e2e/node_modules/playwright-core"
 
@@ -63,6 +71,15 @@ def test_a_slider_moves_the_numbers(address: str) -> None:
         assert found["numbers"]["value"] == pytest.approx(e_to_t - 1)
         assert found["numbers"]["boundary"] == pytest.approx(e_to_t)
         assert "<svg" in found["svg"]
+
+
+def test_an_array_that_is_handed_on_is_looked_at() -> None:
+    """A square of side c, half of it half as bright: 3/4 of c^2."""
+    world = World()
+    answers = Answers(world, world.put("mesh.po", MESH))
+    found = answers.answer("/look", {"name": "light", "values": {"c": 0.8}, "wrt": "c", "which": 0})
+    assert found is not None
+    assert found["numbers"]["value"] == pytest.approx(0.48) and found["numbers"]["boundary"] == pytest.approx(1.2)
 
 
 def test_while_a_slider_is_dragged_four_digits_are_asked_for(address: str) -> None:

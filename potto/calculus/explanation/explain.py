@@ -23,7 +23,7 @@ from potto.calculus.explanation.continuity import continuous
 from potto.calculus.explanation.fields import named_fields, parameter_types
 from potto.calculus.explanation.layout import DerivativeText, IntegralText, SurfaceText
 from potto.calculus.explanation.plain_names import plainly_named
-from potto.calculus.explanation.readable import readable
+from potto.calculus.explanation.readable import in_decimals, readable
 from potto.calculus.explanation.symbols import NoFormula, Rewrite, Words, over_functions
 from potto.calculus.inlining.expand import Resolve, heads_of
 from potto.calculus.solving.pivots import NoClosedForm, pivots
@@ -319,4 +319,5 @@ def _own_surfaces(body: Term, tangents: Mapping[str, Term]) -> tuple[SurfaceText
 
 def equation(surface: Term) -> str:
     """Where a surface is, as people write it: `x = t` for t - x."""
-    return format_term(branch((surface,), False, ONE, ZERO))[1:-1].replace(">=", "=").replace("<=", "=")
+    where = branch((simplify(in_decimals(surface)),), False, ONE, ZERO)
+    return format_term(where)[1:-1].replace(">=", "=").replace("<=", "=")

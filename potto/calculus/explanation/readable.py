@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from fractions import Fraction
-from math import gcd, lcm
+from math import gcd, isfinite, lcm, prod, ulp
 
 from potto.calculus.algebra.ranges import range_of
 from potto.calculus.algebra.rational_form import Rational, normal
@@ -22,6 +22,7 @@ from potto.core.printer import format_term
 from potto.core.terms import (
     ZERO,
     Branch,
+    Const,
     Integral,
     Prim,
     Term,
@@ -43,6 +44,7 @@ from potto.core.terms import (
 
 Box = Mapping[str, tuple[float, float]]
 _ARITHMETIC = ("add", "neg", "mul", "div", "pow", "sqrt", "exp")
+_DIGITS = 15  # of a number that may have been rounded
 _LONG = 4000  # characters of a formula that nobody reads, beyond which nothing is tried
 _MANY = 60  # nodes of what is expanded
 _SUMMANDS = 24
@@ -57,6 +59,32 @@ def readable(term: Term, tangents: frozenset[str], box: Box | None = None) -> Te
         return term
     work = _Work(tangents, _bound(term) | frozenset(box or ()))
     return _decided(transform(term, lambda _, new: work.node(new)), box or {}, work)
+
+
+def in_decimals(term: Term) -> Term:
+    """The same term with its numbers as a person would write them: 0.1 for 0.3 - 0.2, of which a computer makes
+    0.09999999999999998."""
+
+    def change(_: Term, new: Term) -> Term:
+        match new:
+            case Const(name=None, value=value) if len(repr(value)) > _DIGITS:
+                short = float(f"{value:.13g}")
+                return const(short) if abs(short - value) <= 4 * ulp(value) else new
+            case Prim(op="add" | "mul" as op, args=args) if all(map(_is_number, args)):
+                numbers = [Fraction(repr(arg.value)) for arg in args if isinstance(arg, Const)]
+                return const(float(sum(numbers) if op == "add" else prod(numbers)))
+            case Prim(op="neg", args=(Const(name=None, value=value),)):
+                return const(-value)
+            case Prim(op="neg", args=(Prim(op="mul", args=(Const(name=None, value=value), *rest)),)) if value < 0:
+                return mul(const(-value), *rest)
+            case _:
+                return new
+
+    return transform(term, change)
+
+
+def _is_number(term: Term) -> bool:
+    return isinstance(term, Const) and term.name is None and isfinite(term.value)
 
 
 def _bound(term: Term) -> frozenset[str]:

@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 from msgspec import Struct
 
 from potto.calculus.algebra.radicals import NAN
-from potto.calculus.explanation.readable import Box, readable
+from potto.calculus.explanation.readable import Box, in_decimals, readable
 from potto.calculus.surfaces.trace import spine
 from potto.core.printer import format_term
 from potto.core.simplify import simplify
@@ -62,7 +62,7 @@ class Words(Struct, frozen=True):
 
     def plain(self, term: Term) -> str:
         """A term as it is written, parts of records by their names."""
-        return format_term(simplify(self.fields(term)))
+        return format_term(simplify(in_decimals(self.fields(term))))
 
     def text(self, term: Term, *inside: str, box: Box | None = None) -> str:
         """A formula that is Potto, in the parameters, their tangents and the variables it is `inside` of. Raises

@@ -58,6 +58,7 @@ from potto.core.terms import (
 )
 
 ARRAYS: tuple[type[Term], ...] = (Array, Index, Length, ListOf, Fold, Data)
+READS = (Index, Length, Proj)
 MOST_STEPS = 1000  # of a loop that is written out
 
 
@@ -99,7 +100,7 @@ def _pushed(term: Term, varying: frozenset[str]) -> Term:
     """Reads of what varies done on the elements: of arrays that are made on the spot, chosen or added up."""
 
     def change(_: Term, new: Term) -> Term:
-        read = isinstance(new, Index | Length | Proj)
+        read = isinstance(new, READS)
         return _read(new) if read and not varying.isdisjoint(new.free) else new
 
     return transform(term, change)
@@ -128,8 +129,9 @@ def _read(node: Term) -> Term:
 
 
 def _read_of(node: Term, whole: Term) -> Term:
-    """The same read of another array or tuple."""
-    return _read(rebuild(node, (whole, *children(node)[1:])))
+    """The same read of another array or tuple; of one that is written out that is the item itself."""
+    found = rebuild(node, (whole, *children(node)[1:]))
+    return _read(found) if isinstance(found, READS) else found
 
 
 # Sums
