@@ -88,6 +88,38 @@ def test_statistics_tell_what_machine_code_did() -> None:
     assert stats["machine code compiled"] + stats["machine code from the cache"] > 0
 
 
+CALLING = """
+def tone(v) if v > 0.3 then v/(1 + v) else v*v
+def mixed(x, y, shader) tone(shader(x, y))*x + shader(y, 2*x)
+def smooth(x, y) exp(x - y)
+def sharp(x, y) [x > y]*x + y
+def deeper(x, n) if n < 1 then x else deeper(x*x, n - 1)
+"""
+
+
+@needs_llvm
+@pytest.mark.parametrize("name", ["smooth", "sharp"])
+def test_calls_are_part_of_the_machine_code(name: str) -> None:
+    m = potto.compile(CALLING)
+    x, y = np.random.default_rng(5).random((2, 3_000))
+    own = {"smooth": lambda x, y: np.exp(x - y), "sharp": lambda x, y: (x > y) * x + y}[name]
+    v, before = own(x, y), counts.native_points
+    with potto.settings(backend="native"):
+        found = m.mixed(x, y, getattr(m, name))
+    assert counts.native_points - before == x.size  # by one function
+    exact = np.where(v > 0.3, v / (1 + v), v * v) * x + own(y, 2 * x)
+    np.testing.assert_allclose(found.value, exact, rtol=2e-15)
+    with potto.settings(backend="numpy"):
+        np.testing.assert_array_max_ulp(found.value, m.mixed(x, y, getattr(m, name)).value, 2)
+
+
+@needs_llvm
+def test_a_call_that_goes_deeper_as_values_tell_stays_one() -> None:
+    x = np.linspace(0.5, 1.0, 3_000)
+    with potto.settings(backend="native"):
+        np.testing.assert_allclose(potto.compile(CALLING).deeper(x, 3).value, x**8, rtol=1e-14)
+
+
 @needs_llvm
 def test_a_second_process_finds_it_compiled(tmp_path: Path) -> None:
     program = (

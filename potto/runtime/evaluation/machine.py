@@ -48,12 +48,14 @@ from potto.kernels.cells import Cell, Ints, Number, Pattern, Rows, Trace, Value,
 from potto.kernels.chunks import at_points, many
 from potto.kernels.compile import kernel
 from potto.kernels.making import counts
+from potto.kernels.native.objects import available
 from potto.kernels.written import Kernel
 from potto.projects.settings import Settings
 from potto.runtime.evaluation.arguments import fit, uncurried
 from potto.runtime.evaluation.functions import Chosen, Closure, Derivative, Paired
 from potto.runtime.evaluation.reach import Reach
 from potto.runtime.evaluation.record import Record
+from potto.runtime.evaluation.written_in import WrittenIn
 
 DEEPEST_CALLS = 3000
 MOST_TERMS = 10_000_000
@@ -112,6 +114,7 @@ class Linker:
         self.constants: dict[tuple[str, str, Settings], Value] = {}
         self.duals: dict[tuple[Lam, bool], Lam] = {}
         self.reaches: dict[tuple[Term, ...], tuple[tuple[str, str, bytes], ...]] = {}
+        self.written_in = WrittenIn(self.function)
         # the ones met, without a lookup
         self.kernels: dict[tuple[Lam, tuple[Pattern, ...], int, bool, bool, int, bool], Kernel] = {}
 
@@ -300,9 +303,21 @@ class Machine:
             watching(function, args)
         k = self.directions
         found = self.kernel(function, tuple([pattern(a, k) for a in args]))
-        if found.plain and many(args) and not self.taping:
-            return at_points(found, self, trace, args, self.backend)
+        if many(args) and not self.taping:
+            if found.plain:
+                return at_points(found, self, trace, args, self.backend)
+            whole = None if trace or watching else self._written_in(function, args)
+            if whole is not None:
+                return at_points(whole[0], self, trace, whole[1], self.backend)
         return found.run(self, trace, *args)
+
+    def _written_in(self, function: Lam, args: list[Value]) -> tuple[Kernel, list[Value]] | None:
+        """The kernel of a function with all that it calls, and its arguments, where machine code may do that."""
+        found = self.linker.written_in.of(function, args) if self.backend != "numpy" and available() else None
+        if found is None:
+            return None
+        whole = self.kernel(found[0], tuple([pattern(a, self.directions) for a in found[1]]))
+        return (whole, found[1]) if whole.plain else None
 
     def kernel(self, function: Lam, patterns: tuple[Pattern, ...]) -> Kernel:
         """The kernel of a function for arguments of these patterns."""
