@@ -93,6 +93,7 @@ def tone(v) if v > 0.3 then v/(1 + v) else v*v
 def mixed(x, y, shader) tone(shader(x, y))*x + shader(y, 2*x)
 def smooth(x, y) exp(x - y)
 def sharp(x, y) [x > y]*x + y
+def still(x, y) 0.25
 def deeper(x, n) if n < 1 then x else deeper(x*x, n - 1)
 """
 
@@ -111,6 +112,13 @@ def test_calls_are_part_of_the_machine_code(name: str) -> None:
     np.testing.assert_allclose(found.value, exact, rtol=2e-15)
     with potto.settings(backend="numpy"):
         np.testing.assert_array_max_ulp(found.value, m.mixed(x, y, getattr(m, name)).value, 2)
+
+
+@needs_llvm
+def test_what_is_the_same_at_all_points_is_numpys() -> None:
+    m, x = potto.compile(CALLING + "def flat(x, shader) shader(x, x)*2"), np.linspace(0, 1, 3_000)
+    with potto.settings(backend="native"):
+        assert np.all(m.flat(x, m.still).value == 0.5)
 
 
 @needs_llvm

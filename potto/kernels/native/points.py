@@ -65,6 +65,8 @@ class Pointwise:
         wanted = read(operations, names)
         given = tuple(name for name in wanted if name in constant)
         arrays = tuple(name for name in wanted if name not in constant)
+        if not arrays:
+            raise NotStraight("the same at all points")
         outputs = tuple(name for name in names if name in made)
         uniform = tuple(name for name in straight.parts if name in constant)
         prelude = straight.prelude(constant, given)
