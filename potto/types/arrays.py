@@ -99,21 +99,23 @@ def _behind(inference: Inference, size: Type, node: nodes.Index, index: nodes.Ex
         if at.number >= size.number:
             _out_of_range(inference, at.number, size.number, node, index)
         return
-    (base, offset), (same, count) = (
-        (size.base, size.offset) if isinstance(size, Shifted) else (size, 0) for size in (at, size)
-    )
+    (base, offset), (same, count) = _apart(at), _apart(size)
     if base is not same or isinstance(base, AnySize | Unknown) or offset < count:
         return
     written = without_parentheses(index)
     first = written.first if isinstance(written, nodes.Chain) else written
-    own = _size(inference, first)
-    lower = (size.offset if isinstance(size, Shifted) else 0) - (own.offset if isinstance(own, Shifted) else 0) - 1
+    lower = count - _apart(_size(inference, first))[1] - 1
     last = print_expression(first) + (f" {'+' if lower > 0 else '-'} {abs(lower)}" if lower else "")
     message = f"the index `{print_expression(index)}` is out of range: it is not below the number of elements"
     inference.report(kinds.OUT_OF_RANGE(
         index.span, message, label="behind the last", related=_defined(inference, node.array, "is defined here"),
         help=f"indices count from 0, so that the last one is `{last}`", suggestions=(suggest(index.span, last),),
     ))  # fmt: skip
+
+
+def _apart(size: Type) -> tuple[Type, int]:
+    """A size as another one and how much larger it is."""
+    return (size.base, size.offset) if isinstance(size, Shifted) else (size, 0)
 
 
 def _from_the_end(inference: Inference, known: int, node: nodes.Index, place: int) -> None:

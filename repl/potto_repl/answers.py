@@ -82,7 +82,8 @@ def outcome_parts(session: Conversation, outcome: Outcome) -> Iterator[Part]:
     match outcome:
         case Defined():
             kind = "diffeo" if outcome.diffeo else "definition"
-            yield answer(outcome.text, kind=kind, name=outcome.name, type=outcome.type, shadows=outcome.shadows)
+            data = {"kind": kind, "name": outcome.name, "type": outcome.type, "shadows": outcome.shadows}
+            yield Part("answer", outcome.text, data, prose=True)
             if outcome.shadows is not None:
                 yield note(f"shadows {outcome.shadows}")
         case Imported():

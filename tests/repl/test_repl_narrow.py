@@ -35,6 +35,15 @@ def test_help_fits_and_breaks_between_words(talk, columns):
         assert all(width(line) <= columns or " " not in line.strip() for line in told)
 
 
+def test_types_and_times_break_between_words(talk):
+    talk("def f(c: Real, shader: (Real*, Real*) -> Real -> Real) integral [0, 1] shader(x, x)(c) d(x)")
+    for text in (":type f", ":timeit 1 + 1", "def g(c: Real, shader: (Real*, Real*) -> Real -> Real) shader(c, c)(c)"):
+        reply = talk(text)
+        shown = lines(reply, 40)
+        assert all(width(line) <= 40 for line in shown)
+        assert " ".join(" ".join(shown).split()) == reply.text
+
+
 @pytest.mark.parametrize("columns", [20, 44, 80])
 def test_the_greeting_breaks_between_words(columns, monkeypatch):
     monkeypatch.setenv("COLUMNS", str(columns))

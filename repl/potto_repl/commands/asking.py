@@ -30,7 +30,8 @@ UNNAMED = "it"  # what a function without a name is called
 def show_type(session: Conversation, text: str) -> Part:
     """Show the type of an expression without evaluating it."""
     asked = checked(session, text, ":type EXPR")
-    return answer(f"{text.strip()} : {format_type(asked.type)}", type=format_type(asked.type))
+    type = format_type(asked.type)
+    return Part("answer", f"{text.strip()} : {type}", {"type": type}, prose=True)
 
 
 @command("deriv", "d", argument="FUNCTION", completes="expression")

@@ -140,7 +140,7 @@ def time_often(session: Conversation, text: str) -> Part:
     told = f"{len(rounds)} rounds of {times:,}" if len(rounds) > 1 else "one round"
     shown = [f"{format_digits(1e3 * found, 3)} ms" for found in (least, median)]
     return Part("answer", f"{shown[0]} at least, {shown[1]} in the median of {told}",
-                {"least": least, "median": median, "rounds": len(rounds), "times": times})  # fmt: skip
+                {"least": least, "median": median, "rounds": len(rounds), "times": times}, prose=True)  # fmt: skip
 
 
 def _lap(phases: dict[str, float], name: str, start: float) -> float:
