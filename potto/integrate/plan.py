@@ -29,7 +29,7 @@ from potto.calculus.surfaces.case_split import by_extremes
 from potto.calculus.surfaces.discontinuities import Decide, Finding, Resolve, findings
 from potto.calculus.surfaces.hoist import hidden, hoisted
 from potto.calculus.surfaces.lifted import Lifted, lifted
-from potto.calculus.surfaces.nested_brackets import nested
+from potto.calculus.surfaces.nested_brackets import has_nested, nested
 from potto.core.terms import (
     App,
     Branch,
@@ -190,7 +190,7 @@ def make(term: Integral, resolve: Resolve, decide: Decide, inline: Resolve, numb
     found = asked.findings(term.body)
     premises: tuple[Term, ...] = ()
     confused = False
-    if any(map(_may_be_mixed, found)):
+    if any(map(_may_be_mixed, found)) or any(has_nested(i.body) for i in _inner_integrals(term)):
         apart = _apart(term, inline, asked.remember, number)
         if apart is not None:
             term, premises = apart.term, apart.premises
@@ -278,6 +278,11 @@ def _may_fold(term: Integral, levels: Sequence[LevelPlan]) -> bool:
         or any(slope_of(along(cut), variable) is None for cut, variable in inner)
         or any(slopes_of(system, variable) is None for system, variable in systems)
     )
+
+
+def _inner_integrals(term: Integral) -> Iterable[Integral]:
+    """The integrals inside of an integrand: a condition of theirs jumps as the brackets in it fall, here as well."""
+    return (node for node in postorder(term.body) if isinstance(node, Integral))
 
 
 def _may_be_mixed(found: Finding) -> bool:

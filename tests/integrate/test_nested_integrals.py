@@ -217,3 +217,22 @@ def test_samples(method: str) -> None:
         answer = potto.deriv(f)((0.5, 1.0))
     assert abs(answer.value - math.pi / 2) <= 2 * answer.error and answer.error < 0.05
     assert abs(answer.tangent - math.pi) <= 2 * answer.tangent_error + 1e-12 and answer.tangent_error < 0.2
+
+
+@pytest.mark.parametrize("behind", [False, True])
+def test_a_bracket_inside_of_a_condition_of_an_inner_integral(behind: bool) -> None:
+    """What is further in jumps at x = 2 t and 2 t - 1/2, for a part of y each."""
+    t = 0.2
+    inner = "integral [-1, 1] [x + 0.5*[-y - x >= t] > 2*t]*(y + 2) d(y)"
+    program = f"def g(x, t) {inner}\ndef f(t) integral [-0.5, 1.5] exp({'g(x, t)' if behind else f'({inner})'}) d(x)"
+    found = potto.deriv(potto.compile(program).f)((t, 1.0))
+    with mp.workdps(30):
+
+        def whole(u: Any) -> Any:  # of y < -x - t, where u = x + t
+            return mp.exp(((2 - u) ** 2 - 1) / 2)
+
+        value = 2 * t + mp.quad(whole, [3 * t - 0.5, 3 * t]) + (1.5 - 2 * t) * mp.exp(4)
+        rate = 2 + 3 * (whole(3 * t) - whole(3 * t - 0.5)) - 2 * mp.exp(4)
+    assert found.converged
+    assert abs(found.value - float(value)) <= found.error + 16 * EPS * float(value) < 1e-9 * 61
+    assert abs(found.tangent - float(rate)) <= found.tangent_error + 16 * EPS * abs(float(rate)) < 1e-9 * 113
