@@ -10,7 +10,7 @@ from potto_repl.symbols import SYMBOLS, ascii_only, expanded, pretty, readable, 
 
 @pytest.mark.parametrize("text", [
     "1 + 1", "f(1)", "def f(t) t", "def f(t)\n    t\n", "def f(t)\n    t\n\n", ")", "f(1,\n  2)", ":type f(", "f?", "",
-    "a = 1", "def f(t) (", "for v in [1]:\n    print(v)\n", "integral [0, 1]\n    x d(x)",
+    "a = 1", "for v in [1]:\n    print(v)\n", "integral [0, 1]\n    x d(x)",
 ])  # fmt: skip
 def test_these_are_handed_in(text):
     assert is_over(text)
@@ -18,7 +18,7 @@ def test_these_are_handed_in(text):
 
 @pytest.mark.parametrize("text", [
     "def f(t)", "def f(t)\n    a = t", "def f(t)\n    a = t\n    a", "f(", "f(1,", "1 +", "integral [0, 1] x", "a =",
-    "for v in [1]:", "for v in [1]:\n    print(v)", "if x then 1", "(1,\n 2",
+    "for v in [1]:", "for v in [1]:\n    print(v)", "if x then 1", "(1,\n 2", "def f(t) (",
 ])  # fmt: skip
 def test_these_go_on(text):
     assert not is_over(text)
