@@ -103,10 +103,11 @@ class Answers:
     def _look(self, asked: Mapping[str, Any]) -> dict[str, Any]:
         found = self._scene(str(asked["name"]))
         values = {name: float(asked["values"][name]) for name in found.values}
-        wrt, which, ghost = str(asked["wrt"]), int(asked["which"]), asked.get("ghost")
+        wrt, which = str(asked["wrt"]), int(asked["which"])
+        ghost = float(asked.get("ghost") or 0.0) or None  # a step of 0 shows no difference
         start = time.perf_counter()
         with settings(rtol=QUICK) if asked.get("quick") else nullcontext():
-            shot = found.look(values, wrt, which, None if ghost is None else float(ghost), bool(asked.get("nodes")))
+            shot = found.look(values, wrt, which, ghost, bool(asked.get("nodes")))
         svg = integral_svg(shot.view, dark=bool(asked.get("dark")))
         seconds = time.perf_counter() - start
         return {
