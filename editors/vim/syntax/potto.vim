@@ -35,6 +35,7 @@ syntax keyword pottoBuiltin sech sign sin sinc sinh sqrt tan tanh trigamma fst s
 syntax match pottoMeasure "\(\~\s*\)\@<=\K\k*"
 syntax keyword pottoType Real Dist Diffeo
 
+syntax match pottoString "\"[^\"]*\""
 syntax match pottoComment "#.*$" contains=pottoTodo,@Spell
 syntax match pottoExpected "#=.*$"
 syntax match pottoLive "#>" contained
@@ -57,6 +58,7 @@ highlight default link pottoCalculus Special
 highlight default link pottoBuiltin Function
 highlight default link pottoMeasure Type
 highlight default link pottoType Type
+highlight default link pottoString String
 highlight default link pottoComment Comment
 highlight default link pottoExpected Comment
 highlight default link pottoLive SpecialComment
