@@ -24,7 +24,7 @@ def _integral(walk: Walk, node: nodes.Integral) -> Value:
             value = walk.value(part)
             bounds = merge(bounds, flat(value))
             if decides:
-                walk.sink("sum", part.span, value)
+                walk.sink("count", part.span, value)
         if place < len(node.variables):
             variables.append(_variable(walk, node.variables[place], "other" if whole else "variable"))
     for binder in node.variables[len(node.bounds) :]:

@@ -57,7 +57,7 @@ from potto.types.values import (
 
 STARRED = Real(star=True)
 _number = attrgetter("number")
-PLAIN_KINDS: tuple[SinkKind, ...] = ("condition", "jump", "sum", "index", "equality", "declared")
+PLAIN_KINDS: tuple[SinkKind, ...] = ("condition", "jump", "sum", "count", "index", "equality", "declared")
 
 
 @dataclass(frozen=True, slots=True)

@@ -28,6 +28,7 @@ KINDS: dict[SinkKind, Kind] = {
     "condition": kinds.VARYING_CONDITION,
     "jump": kinds.VARYING_JUMP,
     "sum": kinds.VARYING_SUM,
+    "count": kinds.VARYING_SUM,
     "index": kinds.VARYING_CONDITION,
     "equality": kinds.EQUALITY,
     "declared": kinds.DECLARED_PLAIN,
@@ -112,6 +113,8 @@ class _Wording:
                 return f"`{self.sink.node}` jumps, so that its argument may not depend on {self._names()}"
             case "sum":
                 return f"this bound of a sum depends on {self._names()}"
+            case "count":
+                return f"how far this measure counts depends on {self._names()}"
             case "index":
                 return f"this index depends on {self._names()}"
             case "equality":
@@ -126,6 +129,7 @@ class _Wording:
         does = {
             "jump": f"takes a builtin that jumps of {parameter}",
             "sum": f"takes the bound of a sum from {parameter}",
+            "count": f"takes how far a measure counts from {parameter}",
             "index": f"takes an index from {parameter}",
             "equality": f"asks for an equality of {parameter}",
             "declared": f"declares {parameter} to be `Real`",
@@ -176,6 +180,8 @@ class _Wording:
                 return f"{where}write the jump as a bracket, `[x >= 1]`, so that its boundary term is counted"
             case "sum":
                 return f"{where}sum to a fixed bound and put a bracket into the terms, `[i <= x]`"
+            case "count":
+                return f"{where}write a sum to a fixed bound, whose terms are weighted: `sum k in 0..50 (weight(k, x)*…)`"
             case "index":
                 return f"{where}sum over all elements, each with a bracket that says where it counts: `[i <= x] * …`"
             case "equality":
@@ -200,6 +206,7 @@ REASON_TEXT: dict[SinkKind, str] = {
     "condition": "this plain condition decides by it",
     "jump": "this is given to a builtin that jumps",
     "sum": "this is a bound of a sum",
+    "count": "this decides how far a measure counts",
     "index": "this is an index",
     "equality": "this is an equality",
     "declared": "declared `Real` here",

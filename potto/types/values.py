@@ -19,7 +19,7 @@ from potto.quick import quick, value
 from potto.source import Span
 
 SourceKind = Literal["variable", "input", "other"]  # other: the index of a sum, or what is wrong
-SinkKind = Literal["condition", "jump", "sum", "index", "equality", "declared", "integral", "delta"]
+SinkKind = Literal["condition", "jump", "sum", "count", "index", "equality", "declared", "integral", "delta"]
 
 
 NOWHERE = Span(0, 0)

@@ -223,6 +223,9 @@ def test_a_sum_a_builtin_and_an_equality() -> None:
         def g(t)
             integral [0, 3] (sum i in 1..x (i*t)) d(x)
             #                            ^ error[P0303]: this bound of a sum
+        def c(t)
+            integral (x ~ uniform(0, 1), k ~ poisson(x)) [k < t] d(x, k)
+            #                                        ^ error[P0303]: how far this measure counts
         def h(t)
             integral [0, 3] [x == t]*x d(x)
             #               ^^^^^^^^ error[P0304]: measure zero
