@@ -181,7 +181,7 @@ class _Wording:
             case "sum":
                 return f"{where}sum to a fixed bound and put a bracket into the terms, `[i <= x]`"
             case "count":
-                return f"{where}write a sum to a fixed bound, whose terms are weighted: `sum k in 0..50 (weight(k, x)*…)`"
+                return f"{where}write a sum to a fixed bound, of weighted terms: `sum k in 0..50 (weight(k, x)*…)`"
             case "index":
                 return f"{where}sum over all elements, each with a bracket that says where it counts: `[i <= x] * …`"
             case "equality":

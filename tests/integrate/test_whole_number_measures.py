@@ -99,7 +99,7 @@ def test_categorical_and_truncated_and_mixed() -> None:
 
 def test_a_rate_that_varies_inside() -> None:
     """How far the sum goes has to be known outside."""
-    with pytest.raises(potto.PottoError, match="how far this measure counts .*P0303"):
+    with pytest.raises(potto.PottoError, match=r"how far this measure counts .*P0303"):
         potto.compile("def h(t) integral (x ~ uniform(1, 2), k ~ poisson(x)) [x < t] d(x, k)\n").h(1.0)
 
 

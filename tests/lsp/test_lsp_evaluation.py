@@ -242,7 +242,7 @@ def test_an_edited_file_of_data_counts_again(server: Server, uri: Uri, tmp_path:
         heights.write_text(text)
         client.tell("workspace/didChangeWatchedFiles", {"changes": [{"uri": heights.as_uri(), "type": 2}]})
 
-    assert shown(client, uri("main"), {2})[2].== "= 3"
+    assert shown(client, uri("main"), {2})[2] == "= 3"
     assert "[3] Real" in client.ask("textDocument/hover", hover)["contents"]["value"]
     edited("2\n4\n6\n8\n")
     until(lambda: shown(client, uri("main"), {2})[2] == "= 5")
