@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import argparse
 import os
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from potto.checking.library import Library
+    from potto.evaluating.given import Given
     from potto.evaluating.world import World
     from potto.python.functions import Function
 
@@ -48,9 +49,31 @@ def add_set(parser: argparse.ArgumentParser) -> None:
     """The option that gives names of the program other values."""
     parser.add_argument(
         "--set", dest="set", metavar="NAME=EXPR", action="append", default=[], type=assignment,
-        help="what a name of the program stands for instead, or one more name; `xs=@heights.csv` is what a file holds, "
-             "`xs=@people.csv:height` a column",
+        help="what a name of the program stands for instead, or one more name, or what a parameter is given; "
+             "`xs=@heights.csv` is what a file holds, `xs=@people.csv:height` a column",
     )  # fmt: skip
+
+
+def called(world: Library, options: argparse.Namespace, said: Given = ()) -> tuple[str, argparse.Namespace]:
+    """The key of the file of a command that calls the function NAME, and its options, as if what `--set` says of
+    parameters had been given to the function. said: what else is said of parameters, and other texts under no name.
+    Raises ProgramError."""
+    from potto.cli.opening import opened
+
+    file = opened(world, options.file, after=options.name)
+    if not options.set:
+        return file, options
+    from potto.evaluating.given import apart, each_once, give, nobody_asks, parameters_of, unknown
+    from potto.modules import names
+
+    each_once(options.set)
+    said = [*options.given, *said]
+    for_names, for_parameters = apart(world, file, options.set, options.name, {name for name, _ in said})
+    texts = [options.name, *(text for _, text in [*options.set, *said])]
+    for name in nobody_asks(world, file, for_names, texts):
+        raise unknown(world, name, names(world.db, file), parameters_of(world, file, options.name))
+    give(world, file, for_names)
+    return file, argparse.Namespace(**{**vars(options), "set": for_names, "given": [*options.given, *for_parameters]})
 
 
 def function_in(world: World, file: str, text: str) -> Function:
@@ -80,6 +103,9 @@ def argument_in(world: World, file: str, text: str) -> Any:
     return world.evaluate(file, text).estimate.value
 
 
-def arguments_in(world: World, file: str, given: Sequence[tuple[str, str]]) -> dict[str, Any]:
+def arguments_in(world: World, file: str, given: Given) -> dict[str, Any]:
     """Parameters with what they are given. Raises ProgramError."""
+    from potto.evaluating.given import each_once
+
+    each_once(given)
     return {name: argument_in(world, file, text) for name, text in given}

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from msgspec import to_builtins
 from msgspec.structs import asdict
 
-from potto.cli.calling import add_set, argument_in, arguments_in, assignment, function_in
+from potto.cli.calling import add_set, argument_in, arguments_in, assignment, called, function_in
 from potto.cli.console import Console
 from potto.cli.numbers import accounts, add_options, settings_of, show_stats
 
@@ -43,14 +43,16 @@ def run(options: argparse.Namespace, console: Console) -> int:
 def _symbols(options: argparse.Namespace, console: Console) -> int:
     from potto.checking.facts import derivative_facts
     from potto.checking.library import NO_SUCH_DEFINITION, NOWHERE, Library
-    from potto.cli.opening import fail, opened, others_json, report_others
+    from potto.cli.opening import fail, others_json, report_others
     from potto.modules import DefinitionTarget, names, resolve
     from potto.reports.render import Located, ProgramError
     from potto.syntax import nodes
 
     world = Library(["."])
     try:
-        file = opened(world, options.file, options.set, after=options.name)
+        file, options = called(world, options)
+        if options.given:
+            return _numbers(options, console)
         world.need(file, nodes.Name(NOWHERE, options.name))
         target = resolve(world.db, file, options.name)
         facts = None
@@ -75,7 +77,7 @@ def _symbols(options: argparse.Namespace, console: Console) -> int:
 
 
 def _numbers(options: argparse.Namespace, console: Console) -> int:
-    from potto.cli.opening import fail, opened, others_json, report_others
+    from potto.cli.opening import fail, others_json, report_others
 
     chosen = settings_of(options, console)
     if chosen is None:
@@ -86,7 +88,7 @@ def _numbers(options: argparse.Namespace, console: Console) -> int:
 
     world = World(["."])
     try:
-        file = opened(world, options.file, options.set, after=options.name)
+        file, options = called(world, options, [("", text) for _, text in options.along])
         with settings(**asdict(chosen)), accounts(options):
             once, twice = _taken(world, file, options)
     except PottoError as error:

@@ -26,6 +26,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace, console: Console) -> int:
     from potto.cli.files import expand
     from potto.cli.opening import opened
+    from potto.evaluating.given import each_once, give, nobody_asks, unknown
     from potto.evaluating.live import outcomes_of
     from potto.evaluating.world import World
     from potto.reports.render import ProgramError, all_to_json
@@ -33,13 +34,19 @@ def run(options: argparse.Namespace, console: Console) -> int:
     world = World(["."])
     files, problems = expand(options.paths)
     outcomes: list[Outcome] = []
+    unasked = dict(options.set)  # what no file has shown so far
     for path in files:
         try:
-            file = opened(world, path, options.set)
+            file = opened(world, path)
+            each_once(options.set)
+            here = nobody_asks(world, file, options.set, [text for _, text in options.set])
+            unasked = {name: text for name, text in unasked.items() if name in here}
+            give(world, file, options.set)
             problems += world.errors(file)
             outcomes += outcomes_of(world, file)
         except ProgramError as error:
             problems += error.located
+    problems += [located for name in unasked for located in unknown(world, name).located]
     if options.json:
         console.answer_json({"tests": [asdict(o) for o in outcomes], **all_to_json(problems, world.source)})
     else:

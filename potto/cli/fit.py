@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from msgspec.structs import asdict
 
-from potto.cli.calling import add_set, argument_in, arguments_in, assignment, function_in
+from potto.cli.calling import add_set, argument_in, arguments_in, assignment, called, function_in
 from potto.cli.console import Console
 from potto.cli.numbers import accounts, add_options, settings_of, show_stats
 
@@ -73,7 +73,7 @@ def prepare(arguments: list[str]) -> list[str]:
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
-    from potto.cli.opening import fail, opened, report_others
+    from potto.cli.opening import fail, report_others
 
     chosen = settings_of(options, console)
     if chosen is None:
@@ -92,7 +92,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     world = World(["."])
     answers: list[Estimate] = []
     try:
-        file = opened(world, options.file, options.set, after=options.name)
+        file, options = called(world, options, [*options.start, ("", options.target or "0")])
         with settings(**asdict(chosen)), accounts(options):
             found = _fitted(world, file, options, console, answers)
     except PottoError as error:
@@ -123,12 +123,14 @@ def _fitted(
     Raises PottoError; OSError and ValueError for the table.
     """
     from potto.applications.fitting import fit, numbers_of
+    from potto.evaluating.given import each_once
 
     function = function_in(world, file, options.name)
     start = {name: _start(world, file, name, text) for name, text in options.start}
     given = arguments_in(world, file, options.given)
     target: Any = None
     columns = read_table(options.data) if options.data else {}
+    each_once([*options.start, *options.given, *((name, f"@{options.data}:{name}") for name in columns)])
     if options.target is not None:
         by_column = options.target.strip() in columns
         target = columns.pop(options.target.strip()) if by_column else argument_in(world, file, options.target)

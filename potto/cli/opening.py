@@ -25,8 +25,12 @@ def opened(world: Library, path: str | None, given: Sequence[tuple[str, str]] = 
     ProgramError if there is no program there, or something wrong with what is given."""
     key = _found(world, path, after)
     if given:
-        from potto.evaluating.given import give
+        from potto.evaluating.given import each_once, give, nobody_asks, unknown
+        from potto.modules import names
 
+        each_once(given)
+        for name in nobody_asks(world, key, given, [*filter(None, [after]), *(text for _, text in given)]):
+            raise unknown(world, name, names(world.db, key))
         give(world, key, given)
     return key
 

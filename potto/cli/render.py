@@ -7,7 +7,7 @@ import math
 import time
 from typing import TYPE_CHECKING, Any
 
-from potto.cli.calling import add_set, assignment
+from potto.cli.calling import add_set, assignment, called
 from potto.cli.console import Console
 from potto.cli.numbers import accounts, add_options, add_workers, settings_of, show_stats
 
@@ -260,7 +260,7 @@ def _watched(options: argparse.Namespace) -> Library | None:
 
 def _once(options: argparse.Namespace, target: str, settings: Settings, console: Console) -> int:
     from potto.applications.picture_files import NUMBERS, ending_of
-    from potto.cli.opening import fail, opened, report_others
+    from potto.cli.opening import fail, report_others
     from potto.cli.rendering import drawn, layers, outlines, picture_of, save_figure
     from potto.diagnostics import PottoError
     from potto.evaluating.world import World
@@ -268,7 +268,7 @@ def _once(options: argparse.Namespace, target: str, settings: Settings, console:
     world = World(["."])
     grid = grid_of(options)
     try:
-        file = opened(world, options.file, options.set, after=options.name)
+        file, options = called(world, options, _said(options))
         picture = picture_of(world, file, options, ending_of(target) not in NUMBERS)
         with accounts(options):
             found = drawn(picture, grid, settings, options, console)
@@ -292,6 +292,13 @@ def _once(options: argparse.Namespace, target: str, settings: Settings, console:
         return 1
     _tell(files, found, grid, options, console)
     return 130 if found.interrupted else report_others(world, file, options, console)
+
+
+def _said(options: argparse.Namespace) -> list[tuple[str, str]]:
+    """What is said of parameters beside what they are given: that they move, or are axes."""
+    name, *ends = options.over or ("",)
+    axes = options.axes.split(",") if options.axes else []
+    return [*((name, end) for end in ends), *((axis.strip(), "0") for axis in axes)]
 
 
 def _write(layer: Layer, grid: Grid, options: argparse.Namespace) -> None:

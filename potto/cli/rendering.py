@@ -97,6 +97,9 @@ def picture_of(world: World, file: str, options: argparse.Namespace, drawable: b
     for name in axes:
         if name and name not in function.parameters:
             raise wrong_call(f"`{options.name}` has no parameter `{name}` to be an axis", _listed(function))
+        if name in fixed:
+            how = "is given a value" if name in given else "moves"
+            raise wrong_call(f"`{name}` {how} and is an axis, too", f"leave out `{name}=…`, or name another axis")
     if len(axes) == 2 and axes[0] == axes[1]:
         raise wrong_call(f"both axes are `{axes[0]}`", "name two parameters, `--axes x,y`")
     if len(axes) != 2 or not all(axes):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from potto.cli.calling import add_set, assignment
+from potto.cli.calling import add_set, assignment, called
 from potto.cli.console import Console
 from potto.cli.numbers import add_options, settings_of
 
@@ -44,6 +44,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     from potto.applications.integral_scenes import IntegralScene
     from potto.cli.opening import fail, opened
     from potto.diagnostics import PottoError
+    from potto.evaluating.given import each_once
     from potto.evaluating.world import World
     from potto.projects.settings import settings
 
@@ -59,7 +60,11 @@ def run(options: argparse.Namespace, console: Console) -> int:
         return 2
     world = World(["."])
     try:
-        file = opened(world, options.file, options.set, after=options.name)
+        if options.name is None:
+            file = opened(world, options.file, options.set)
+        else:
+            file, options = called(world, options)
+            each_once(options.given)
         if path is None and not options.json:
             with settings(**asdict(chosen)):
                 return _page(world, file, options, console)

@@ -1,4 +1,5 @@
-"""Which imports of a file are used: in its definitions and statements, in live expressions, or by other files.
+"""Which names a file uses: in its definitions and statements, in live expressions; and which of its imports are used,
+here or by other files.
 
 Another file may take a name from here that is only imported here: it is passed on. That is asked of the workspace, and
 only for names that would be reported otherwise.
@@ -39,6 +40,11 @@ def used_imports(db: Database, file: str) -> frozenset[str]:
     return frozenset(found)
 
 
+def used_names(db: Database, file: str) -> frozenset[str]:
+    """The names that occur in a file and are not bound where they stand."""
+    return frozenset().union(*[occurring_in_piece(db, text, is_diffeo(file)) for text in pieces(db, file)])
+
+
 @query(keep=512)
 def occurring_in_piece(db: Database, text: str, diffeo: bool) -> frozenset[str]:
     """The same as `occurring_names`, of all chunks of a piece."""
@@ -52,10 +58,17 @@ def occurring_names(db: Database, text: str, diffeo: bool) -> frozenset[str]:
     _collect(chunk_references(db, text, diffeo), found)
     if "#>" in text:
         for live in live_expressions(text):
-            _collect(references_in(parse_expression(live.text).expr), found)
+            found |= names_in(live.text)
     if any(diagnostic.severity == "error" for diagnostic in parsed(db, text, diffeo).diagnostics):
         for word in _WORD.findall(text):  # half-written: what the tree has lost may be used all the same
             found.update(_heads(word))
+    return frozenset(found)
+
+
+def names_in(expression: str) -> frozenset[str]:
+    """The same of an expression."""
+    found: set[str] = set()
+    _collect(references_in(parse_expression(expression).expr), found)
     return frozenset(found)
 
 

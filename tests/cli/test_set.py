@@ -37,7 +37,7 @@ def answered(capsys: pytest.CaptureFixture[str], *words: str, status: int = 0) -
     [
         ([], "2"),
         (["c=3"], "6"),
-        (["c=3", "c=k + 1", "k=4"], "10"),
+        (["c=k + 1", "k=4"], "10"),
         (["shade=\\x . 7*x"], "14"),
         (["shade=\\x . c*x^2", "c=5"], "20"),
     ],
@@ -71,6 +71,45 @@ def test_pictures_fits_and_derivatives(program: str, tmp_path: Path, capsys: pyt
     assert np.allclose(np.sort(np.load(target).ravel()), [1, 2, 2, 3])  # 2*(x + y) at the quarters
     assert "a = 4" in answered(capsys, "fit", program, "loss", "a=1", "--set", "c=4")
     assert "interior  2*x*dx" in answered(capsys, "deriv", program, "shade", "--set", "shade=\\x . x^2")
+
+
+def test_parameters_are_given_by_it_as_well(program: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert "by a: 4" in answered(capsys, "deriv", program, "loss", "--set", "a=3")
+    assert "by y: 5" in answered(capsys, "deriv", program, "pixel", "--set", "y=1", "--set", "c=5", "x=0")
+    assert "a = 4" in answered(capsys, "fit", program, "\\(a, b) . (a*b - c)^2", "a=1", "--set", "b=2", "--set", "c=8")
+
+
+TWO = "def line(x, c) c*x\n"
+
+
+@pytest.mark.parametrize(
+    ("command", "said"),
+    [
+        (["render", "line", "--set", "c=2"], "given nothing are: `x`"),  # it is no axis
+        (["render", "line", "--set", "c=2", "--axes", "x,c"], "`c` is given a value and is an axis, too"),
+        (["render", "line", "--set", "c=2", "--over", "c=0..1"], "`c` is given a value and moves, too"),
+        (["render", "line", "c=2", "--set", "c=3"], "`c` is given twice, `2` and `3`"),
+        (["render", "line", "--set", "c=2", "--set", "c=3"], "`c` is given twice, `2` and `3`"),
+        (["deriv", "line", "c=2", "c=3"], "`c` is given twice, `2` and `3`"),
+        (["fit", "line", "c=2", "--with", "c=3"], "`c` is given twice, `2` and `3`"),
+        (["render", "line", "--set", "cc=2"], "P0232"),
+        (["eval", "line(1, 2)", "--set", "c=3"], "the program has no `c`"),  # nothing asks for it: line binds its own
+    ],
+)
+def test_what_nothing_or_more_than_one_thing_is_meant_by(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], command: list[str], said: str
+) -> None:
+    (tmp_path / "two.po").write_text(TWO)
+    name, *rest = command
+    assert said in answered(capsys, name, str(tmp_path / "two.po"), *rest, status=1)
+
+
+def test_a_name_that_is_a_parameter_too(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "two.po").write_text("c = 1\ndef scaled(x) c*x\ndef f(x, c) scaled(x) + c\n")
+    assert "give the parameter its value without --set: `c=3`" in answered(
+        capsys, "deriv", str(tmp_path / "two.po"), "f", "x=1", "--set", "c=3", status=1
+    )
+    assert "f = 5" in answered(capsys, "deriv", str(tmp_path / "two.po"), "f", "x=1", "c=2", "--set", "c=3")
 
 
 def test_live_expressions_with_other_data(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
