@@ -13,6 +13,7 @@ from potto.reports.near import near_names
 
 _ELSEWHERE = {
     "ln": "the natural logarithm is `log`",
+    "e": "the exponential is `exp(x)`, and `e` is `exp(1)`",
     "log2": "write `log(x)/log(2)`",
     "log10": "write `log(x)/log(10)`",
     "arcsin": "write `asin`",
@@ -38,6 +39,7 @@ _ELSEWHERE = {
     "null": "every expression has a value; leave it out",
     "range": "write a range, `0..n-1`, as in `[i^2 for i in 0..n-1]` and `sum i in 0..n-1 (…)`",
     "integrate": "write `integral [lo, hi] body d(x)`",
+    "int": "write `integral [lo, hi] body d(x)`",
     "quad": "write `integral [lo, hi] body d(x)`",
     "grad": "write `deriv(f)((x, 1))`: the value and the derivative",
     "diff": "write `deriv(f)((x, 1))`: the value and the derivative",

@@ -227,6 +227,7 @@ sign = register(
         interval=ends("sign"),
         doc="-1, 0 or 1. It jumps, so it takes plain values only; under an integral use `[x > 0]`.",
         plain=True,
+        brackets="`2*[x > 0] - 1`",
         domain=((-1e6, 1e6),),
         example="sign(-2.5)",
     )
@@ -243,6 +244,7 @@ floor = register(
         interval=ends("floor"),
         doc="The greatest whole number that is not above x. It jumps, so it takes plain values only.",
         plain=True,
+        brackets="`sum k in 1..n ([x >= k])`, for x from 0 to n",
         domain=((-1e6, 1e6),),
         example="floor(2.7)",
     )
@@ -259,6 +261,7 @@ ceil = register(
         interval=ends("ceil"),
         doc="The least whole number that is not below x. It jumps, so it takes plain values only.",
         plain=True,
+        brackets="`sum k in 0..n ([x > k])`, for x from 0 to n",
         domain=((-1e6, 1e6),),
         example="ceil(2.2)",
     )

@@ -51,6 +51,7 @@ class Primitive(Struct, frozen=True):
     topic: the section of the page of builtins.
     lacks: the domains that it has no rule for: a bare list of debts, which the tests hold against the rules.
     plain: takes plain values only (sign, floor, ceil). truth: a truth value.
+    brackets: for those that jump, their jumps as brackets, for messages.
 
     Values:
     numpy: the name of a ufunc: "sqrt" is numpy's, "special.erf" is scipy.special's, "potto.xyz" is one of
@@ -103,6 +104,7 @@ class Primitive(Struct, frozen=True):
     orders: int = 0
     lacks: frozenset[str] = frozenset()
     plain: bool = False
+    brackets: str = ""
     surface: bool = True
     truth: bool = False
 

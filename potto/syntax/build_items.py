@@ -49,8 +49,8 @@ def definition(context: Context, v: Values) -> Item:
         context.report(
             kinds.DEFINITION_HEAD(
                 separator.span,
-                "no `=` between the head of a `def` and its body",
-                help="take it out",
+                "a `def` has no `=`: its body follows its head",
+                help="take out the `=`",
                 suggestions=take_out(context.text, separator.span),
             )
         )

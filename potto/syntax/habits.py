@@ -6,6 +6,8 @@ message says all; what follows would only be guessed, so that the rest of the ch
 
 from __future__ import annotations
 
+import re
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from potto.diagnostics import Diagnostic, suggest
@@ -16,6 +18,7 @@ from potto.syntax.tokens import Token
 if TYPE_CHECKING:
     from potto.syntax.messages import Stop
 
+_TYPE = re.compile(r"[A-Z([]")
 _STATEMENTS = {
     "while": "there are no loops but `for` over a list in a script; `sum i in 1..n (…)` adds, recursion repeats",
     "class": "values with names for their parts are records: `record Camera(eye: Real, focal: Real)`",
@@ -34,10 +37,18 @@ _STATEMENTS = {
     "global": "names of the file are known in its definitions",
 }
 
+_SEVERAL = re.compile(r"\s*\([^()]*\)\s*in\b")
+_OF_ARRAY = re.compile(r"\s*\(\s*([^\W\d]\w*)\s*\)")
+
 
 def foreign_statement(tokens: list[Token]) -> Diagnostic | None:
     """What is said of a chunk with errors that starts with a word of another language before a name."""
-    if len(tokens) < 2 or tokens[0].kind != "NAME" or tokens[1].kind not in ("NAME", "NUMBER"):
+    first = [token.kind for token in tokens[:3]]
+    if first == ["LET", "NAME", "LPAR"] and all(token.kind != "IN" for token in tokens):
+        hint, written = f"write `def {tokens[1].text}(…) body`", suggest(tokens[0].span, "def")
+        message = "a function is defined with `def`, not with `let`"
+        return kinds.OTHER_LANGUAGE(tokens[0].span, message, help=hint, suggestions=(written,))
+    if first[:1] != ["NAME"] or first[1:2] not in (["NAME"], ["NUMBER"]):
         return None
     help = _STATEMENTS.get(tokens[0].text)
     if help is None:
@@ -57,7 +68,13 @@ def habit(stop: Stop) -> Diagnostic | None:
 
 
 def _lambda(stop: Stop) -> Diagnostic | None:
-    if stop.at.kind != "COLON":
+    at, after = stop.at, stop.after
+    arrow = _arrow(at, after)
+    if arrow is not None and stop.before is not None and stop.before.kind in ("NAME", "RPAR"):
+        return kinds.OTHER_LANGUAGE(
+            arrow, "a function without a name starts with `\\`, not with an arrow", help="write `\\x . e`"
+        )
+    if at.kind != "COLON":
         return None
     before = stop.tokens[: stop.index]
     word = next((token for token in reversed(before) if token.text == "lambda" and token.kind == "NAME"), None)
@@ -66,6 +83,24 @@ def _lambda(stop: Stop) -> Diagnostic | None:
     return kinds.OTHER_LANGUAGE(
         word.span, "Potto has no `lambda`: a function without a name starts with `\\`", help="write `\\x . e`"
     )
+
+
+def _arrow(at: Token, after: Token | None) -> Span | None:
+    """The place of an `->` or `=>`."""
+    if at.kind == "ARROW":
+        return at.span
+    double = at.kind == "EQ" and after is not None and after.text == ">" and after.start == at.end
+    return at.span.cover(after.span) if double and after is not None else None
+
+
+def arrow_before_body(tokens: list[Token]) -> Diagnostic | None:
+    """`def f(x) -> x^2`, `def f(x) => x^2`."""
+    for at, after in pairwise(tokens):
+        arrow = _arrow(at, after)
+        if arrow is not None and not (at.kind == "ARROW" and (not after.text or _TYPE.match(after.text))):
+            message = "the body of a `def` follows its head without an arrow"
+            return kinds.DEFINITION_HEAD(arrow, message, help="take the arrow out; `->` is for the type of the result")
+    return None
 
 
 def _loop(stop: Stop) -> Diagnostic | None:
@@ -118,11 +153,26 @@ def _bounds(stop: Stop) -> Diagnostic | None:
 
 
 def _sum(stop: Stop) -> Diagnostic | None:
-    """`sum(i in 1..3) …`."""
-    if stop.at.kind != "LPAR" or stop.before is None or stop.before.kind != "SUM":
+    """`sum(i in 1..3) …`, `sum(i^2 for i in 1..3)`, `sum(i, 1, 3, i^2)`."""
+    opening = stop.after if stop.at.kind == "SUM" else stop.at
+    word = stop.at if stop.at.kind == "SUM" else stop.before
+    if opening is None or opening.kind != "LPAR" or word is None or word.kind != "SUM":
+        return None
+    if loop_hint(stop):
         return None
     message = "the variable of a `sum` stands without parentheses, its terms stand in them"
-    return kinds.UNEXPECTED(stop.at.span, message, help="write `sum i in 1..n (body)`")
+    return kinds.UNEXPECTED(opening.span, message, help="write `sum i in 1..n (body)`")
+
+
+def loop_hint(stop: Stop) -> str:
+    """What to write for a loop over tuples by the names of their parts, or for `sum(xs)`."""
+    at, rest = stop.at, stop.text[stop.at.end :]
+    if (at.kind in ("SUM", "FOR") and _SEVERAL.match(rest)) or (
+        at.kind == "IN" and stop.before is not None and stop.before.kind == "RPAR"
+    ):
+        return "what goes through an array has one name: `sum p in ps (p.0*p.1)`"
+    whole = _OF_ARRAY.match(rest) if at.kind == "SUM" else None
+    return f"write `sum x in {whole[1]} (x)`" if whole is not None else ""
 
 
 def tuple_without_parentheses(stop: Stop) -> Diagnostic | None:

@@ -6,7 +6,6 @@ user's words.
 
 from __future__ import annotations
 
-import re
 from typing import Any
 
 from msgspec import Struct
@@ -14,7 +13,7 @@ from msgspec import Struct
 from potto.diagnostics import Diagnostic, Related
 from potto.source import Span
 from potto.syntax import kinds
-from potto.syntax.habits import tuple_without_parentheses
+from potto.syntax.habits import arrow_before_body, loop_hint, tuple_without_parentheses
 from potto.syntax.repair import Edit
 from potto.syntax.suggesting import write
 from potto.syntax.tokens import RESERVED, Token
@@ -259,6 +258,9 @@ def _missing_expression(stop: Stop) -> Diagnostic:
 def _no_body(stop: Stop) -> Diagnostic:
     head = next((v for v in stop.values if isinstance(v, Token) and v.kind in ("DEF", "DIFFEODEF")), None)
     name = next((v for v in stop.values if isinstance(v, Token) and v.kind == "NAME"), None)
+    arrow = arrow_before_body(stop.tokens)
+    if arrow is not None:
+        return arrow
     if head is None or name is None or not name.text:
         return kinds.MISSING_EXPRESSION(stop.place, "expected an expression")
     return kinds.MISSING_EXPRESSION(
@@ -302,19 +304,6 @@ _GOES_WITH = {
     "ARROW": "`->` goes before the type of a definition's result",
 }
 """What is said of a word that stands where it has no meaning."""
-_SEVERAL = re.compile(r"\s*\([^()]*\)\s*in\b")
-_OF_ARRAY = re.compile(r"\s*\(\s*([^\W\d]\w*)\s*\)")
-
-
-def _loop_hint(stop: Stop) -> str:
-    """What to write for a loop over tuples by the names of their parts, or for `sum(xs)`."""
-    at, rest = stop.at, stop.text[stop.at.end :]
-    if (at.kind in ("SUM", "FOR") and _SEVERAL.match(rest)) or (
-        at.kind == "IN" and stop.before is not None and stop.before.kind == "RPAR"
-    ):
-        return "what goes through an array has one name: `sum p in ps (p.0*p.1)`"
-    whole = _OF_ARRAY.match(rest) if at.kind == "SUM" else None
-    return f"write `sum x in {whole[1]} (x)`" if whole is not None else ""
 
 
 def _unexpected(stop: Stop) -> Diagnostic:
@@ -323,7 +312,7 @@ def _unexpected(stop: Stop) -> Diagnostic:
         before = stop.before
         what = f"something is missing after `{_shown(before)}`" if before is not None else "something is missing"
         return kinds.UNFINISHED(stop.place, what)
-    hint = _loop_hint(stop) or _GOES_WITH.get(at.kind, "")
+    hint = loop_hint(stop) or _GOES_WITH.get(at.kind, "")
     if at.kind in ("NAME", "NUMBER", "MEMBER") and stop.before is not None:
         return kinds.UNEXPECTED(at.span, f"`{_shown(at)}` does not belong after `{_shown(stop.before)}`", help=hint)
     related = _from(opened) if opened is not None and at.kind in ("NEWLINE", "RPAR", "RSQB") else ()

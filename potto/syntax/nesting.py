@@ -20,8 +20,9 @@ MOST_MESSAGES = 50
 _CLOSER = {"LPAR": "RPAR", "LSQB": "RSQB"}
 _CHARACTER = {"LPAR": "(", "RPAR": ")", "LSQB": "[", "RSQB": "]"}
 
-_DIFFERENTIAL = re.compile(rf"\bd ?({FIRST_NAME.pattern})\Z")
-"""`dx` or `d x`, as mathematics writes it."""
+_DIFFERENTIAL = re.compile(rf"\bd ?({FIRST_NAME.pattern})")
+_DIFFERENTIALS = re.compile(rf"(?:{_DIFFERENTIAL.pattern}[ *]*)+\Z")
+"""`dx`, `d x` or `dx dy`, as mathematics writes it."""
 
 _DIFFERENTIATES = re.compile(r"\s*d\s*\(")
 
@@ -114,7 +115,8 @@ class Nesting:
 
     def _end_integral(self, opener: _Open) -> None:
         last = self.tokens[-1].end
-        written = _DIFFERENTIAL.search(self.text, max(opener.start, last - 40), last)
+        written = _DIFFERENTIALS.search(self.text, max(opener.start, last - 40), last)
+        meant = f"d({', '.join(_DIFFERENTIAL.findall(written[0]))})" if written else ""
         word = "∫" if self.text[opener.start] == "∫" else "integral"
         self.report(
             kinds.NO_DIFFERENTIAL(
@@ -122,8 +124,8 @@ class Nesting:
                 f"this `{word}` has no `d(...)`",
                 label="which variables does it integrate over?",
                 related=(Related(Span(last, last), "the integral ends here"),),
-                help=f"write `d({written[1]})`" if written else "end the integral with its variables: `d(x)`",
-                suggestions=(insert(last, f" d({written[1]})"),) if written else (),
+                help=f"write `{meant}`" if written else "end the integral with its variables: `d(x)`",
+                suggestions=(insert(last, f" {meant}"),) if written else (),
             )
         )
         self.tokens += [Token(kind, "", last, last) for kind in ("D", "LPAR", "RPAR")]

@@ -16,6 +16,7 @@ from potto.source import Span
 from potto.syntax import kinds
 from potto.syntax.chunks import split
 from potto.syntax.engine import Engine
+from potto.syntax.foreign_integrals import foreign_integral
 from potto.syntax.groups import Context
 from potto.syntax.habits import foreign_statement, habit
 from potto.syntax.lexer import MAX_LENGTH, Lexed, lex
@@ -75,6 +76,9 @@ def parse_chunk(text: str, diffeo: bool = False) -> ParsedChunk:
     foreign = foreign_statement(lexed.tokens) if diagnostics else None
     if foreign is not None:
         item, diagnostics = BrokenItem(Span(0, len(text)), None), [foreign]
+    elsewhere = foreign_integral(text, lexed.tokens, diagnostics) if diagnostics and foreign is None else None
+    if elsewhere is not None:
+        item, diagnostics = None, _only(elsewhere, diagnostics)
     if item is None:
         item = _salvage(text, lexed.tokens, diffeo)
     return ParsedChunk(item, _sorted(diagnostics), comments)
@@ -89,7 +93,15 @@ def parse_expression(text: str) -> ParsedExpression:
     expr, diagnostics = None, lexed.diagnostics
     if not lexed.too_deep:
         expr, diagnostics = _bounded(_parse(lexed, text, "expression"))
+    elsewhere = foreign_integral(text, lexed.tokens, diagnostics) if diagnostics else None
+    if elsewhere is not None:
+        expr, diagnostics = None, _only(elsewhere, diagnostics)
     return ParsedExpression(expr if expr is not None else broken, _sorted(diagnostics))
+
+
+def _only(said: Diagnostic, found: list[Diagnostic]) -> list[Diagnostic]:
+    """A message that says all of what follows, and those ahead of it."""
+    return [*(d for d in found if d.span.end <= said.span.start), said]
 
 
 def completeness(text: str, diffeo: bool = False) -> Literal["complete", "incomplete", "wrong"]:
@@ -161,10 +173,11 @@ def _parse(lexed: Lexed, text: str, start: str, diffeo: bool = False) -> _Parse:
         foreign = habit(stop)
         if foreign is not None:
             told = [foreign] if stop.place.start <= guessed else []
+            found = [d for d in found if d.code != kinds.NO_DIFFERENTIAL.code or d.span.start != foreign.span.start]
             return _Parse(None, tokens, [*found, *stops, *told], first_stop, stops)
         if stop.place.start <= guessed and not _explained(stop, found):
             said = describe(stop, edits or [])
-            if all(d.code != kinds.UNFINISHED.code or d.span != said.span for d in found):  # an `integral` alone
+            if not any(_says_it(told, said) for told in found + stops):
                 stops.append(said)
         if edits is None:
             break
@@ -210,6 +223,13 @@ def _without_doubled(found: list[Diagnostic], stop: Stop) -> list[Diagnostic]:
     at = stop.at.start
     code = kinds.NO_DIFFERENTIAL.code
     return [d for d in found if d.code != code or all(related.span.start != at for related in d.related)]
+
+
+def _says_it(told: Diagnostic, said: Diagnostic) -> bool:
+    """Whether a message says already what is wrong: an `integral` alone, or a `sum` that misses two of its parts."""
+    if told.code != kinds.UNFINISHED.code:
+        return False
+    return told.span == said.span or (told.code == said.code and bool(told.related) and told.related == said.related)
 
 
 def _causes(found: list[Diagnostic], stops: list[Diagnostic]) -> list[Diagnostic]:

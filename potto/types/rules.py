@@ -11,6 +11,7 @@ from collections.abc import Mapping
 
 from potto.diagnostics import Diagnostic, Kind, Related
 from potto.modules.lookup import DefinitionTarget
+from potto.primitives import PRIMITIVES
 from potto.quick import quick, value
 from potto.source import Span
 from potto.syntax import nodes
@@ -177,7 +178,8 @@ class _Wording:
         where = f"in `{self.sink.origin.name}` " if isinstance(self.sink.origin, DefinitionTarget) else ""
         match self.sink.kind:
             case "jump":
-                return f"{where}write the jump as a bracket, `[x >= 1]`, so that its boundary term is counted"
+                shown = PRIMITIVES[self.sink.node].brackets if self.sink.node in PRIMITIVES else "`[x >= 1]`"
+                return f"{where}write its jumps as brackets, so that their boundary terms are counted: {shown}"
             case "sum":
                 return f"{where}sum to a fixed bound and put a bracket into the terms, `[i <= x]`"
             case "count":

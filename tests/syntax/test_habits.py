@@ -61,9 +61,22 @@ def test_mathematics() -> None:
         #        ^^^^^^^^^^^ error[P0104]: the bounds of an integral stand in brackets
         def f(t) integral(0, 1, [x < t], x)
         #        ^^^^^^^^^^ error[P0104]: the bounds of an integral stand in brackets
-        #        ^^^^^^^^ error[P0105]: this `integral` has no `d(...)`
         def f(t) integral (x in [0, 1]) x d(x)
-        #                    ^^ error[P0103]: the bounds of an integral stand alone
+        #        ^^^^^^^^^^^^^^^^^^^^^^ error[P0117]: the bounds of an integral come first
+        def f(t) integral x = 0..t, y in [0, 2*t] x*y
+        #        ^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^ error[P0117]: the bounds of an integral come first
+        def f(t) integral x ~ normal(0, 1) [x < t]
+        #        ^^^^^^^^^^^^^^^^^^^^^^^^^ error[P0117]: the bounds of an integral come first
+        def f(t) integral [0, 1], [0, t] x*y d(x, y)
+        #        ^^^^^^^^^^^^^^^^^^^^^^^ error[P0117]: the bounds of an integral come first
+        def f(t) integral([0, t], 2*x, x)
+        #        ^^^^^^^^ error[P0117]: an integral is no call
+        def f(n) sum i = 1..n (i^2)
+        #              ^ error[P0104]: expected `in` after the variable of `sum`
+        def f(x) -> x^2
+        #        ^^ error[P0119]: the body of a `def` follows its head without an arrow
+        f = x => x^2
+        #     ^^ error[P0117]: a function without a name starts with `\\`, not with an arrow
         def f(t) sum(i in 1..3) i*t
         #           ^ error[P0103]: the variable of a `sum` stands without parentheses
         def f(x) g'(x)
@@ -91,6 +104,12 @@ def test_a_line_that_is_indented_more_goes_on() -> None:
     [
         ("def f(t) integral [0, 1] t dx", "write `d(x)`"),
         ("def f(t) integral [0, 1] t d θ", "write `d(θ)`"),
+        ("def f(t) integral [0, 1] t dx dy", "write `d(x, y)`"),
+        ("def f(t) 2*integral x = 0..2*t, y in [0, 1] x", "write `integral ([0, 2*t], [0, 1]) … d(x, y)`"),
+        ("def f(t) ∫ x from 0 to 1 of t*x", "write `∫ [0, 1] … d(x)`"),
+        ("def f(t) integral x ~ beta(2, t), y in [0, 1] x", "write `integral (x ~ beta(2, t), [0, 1]) … d(x, y)`"),
+        ("def f(t) integral([0, t], 2*x, x)", "write `integral [0, t] 2*x d(x)`"),
+        ("let f(x) = x^2", "write `def f(…) body`"),
         ("f x = x", "write `def f(x) …`"),
         ("def f x = x", "write `def f(x)`, or without `def`: `f = …`"),
         ("def f(x y) x", "write `,` between the two"),

@@ -328,7 +328,7 @@ def test_imports() -> None:
 def test_heads() -> None:
     check_messages("""
         def f(x) = 3
-        #        ^ error[P0119]: no `=` between the head of a `def` and its body
+        #        ^ error[P0119]: a `def` has no `=`
         def f 3
         #   ^ error[P0119]: `f` has no parameters
     """)
