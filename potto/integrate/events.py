@@ -170,7 +170,6 @@ LATE = Shortfall("it takes longer than others that are evaluated with it")
 UNSEEN_MEETING = Shortfall("surfaces meet, or lie on a bound, that an inner integral jumps at", JOIN)
 UNCOUNTED_JUMP = Shortfall("a condition jumps inside an inner integral where its boundary term is not counted", JOIN)
 UNKNOWN_JUMP = Shortfall("a condition jumps by itself where it is not known how that place moves")
-CROWDED = Shortfall("too many surfaces meet where a range has length zero", BESIDE)
 EMPTY_UNSEEN = Shortfall("an inner integral jumps where a range has length zero", JOIN)
 EMPTY_UNDEFINED = Shortfall("the integrand is not defined where a range has length zero", BESIDE)
 TOO_MANY_CASES = Shortfall(

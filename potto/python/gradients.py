@@ -312,7 +312,7 @@ class _Run:
         values = [moving[name] if name in moving else pad(value, k) for name, value in self.arguments]
         self.moved = values, machine
         with self.clock:
-            value = in_lists(as_a_whole(machine, lambda own: self.call.value(values, own), kinks=True))
+            value = in_lists(as_a_whole(machine, self.call.elaborated, lambda own: self.call.value(values, own)))
             if not _numbers(value):
                 raise wrong_call("only a number or a tuple of numbers has a gradient")
             with np.errstate(all="ignore"):

@@ -157,3 +157,29 @@ def test_a_fold_hit_to_the_last_place(ulps: int, scale: float) -> None:
     assert not answer.converged
     (note,) = answer.notes
     assert float(note.backward) == math.inf and abs(float(note.forward) - 1 / (3 * scale)) <= 1e-9
+
+
+@pytest.mark.parametrize(
+    ("body", "backward", "forward"),
+    [
+        ("3*(integral [0, 1] [x < t] d(x)) + t", 1.0, 4.0),
+        ("(integral [0, 1] [x < t] d(x)) + (integral [0, 1] [x < 2*t] d(x))", 0.0, 3.0),
+        ("sum k in 1..6 (integral [0, 1] [0.7*x < t*k] d(x))", 0.0, 30.0),
+        ("abs(t) + 2*(integral ([-1, 1], [-1, 1]) [x^2 + y^2 < t] d(x, y))", -1.0, 1 + 2 * math.pi),
+        ("abs(t) + (integral [-1, 1] [x^2 < t] d(x))", -1.0, INF),
+        ("abs(t) + (integral [0, 1] max(x*t, 0) d(x))", -1.0, 1.5),
+        # of many surfaces on one bound, the last of which comes in as far as it is fast: the sum of e^j - 1 over 0.7
+        ("integral [0, 1] exp(sum k in 1..6 ([0.7*x < t*k])) d(x)", 0.0, sum(math.expm1(j) for j in range(1, 7)) / 0.7),
+        # of many inside, between which e^j stands: k more of them are above it on one side, k less on the other
+        ("integral [-1, 1] exp(sum k in 1..6 ([x < t*k])) d(x)",
+         6 * math.e**6 - sum(math.exp(j) for j in range(6)), sum(math.exp(j) for j in range(1, 7)) - 6),
+    ],
+)  # fmt: skip
+def test_what_is_made_of_integrals_has_the_two_sides_of_the_whole(body: str, backward: float, forward: float) -> None:
+    (note,) = rate(body).notes
+    assert note.backward == pytest.approx(backward, rel=1e-9) and note.forward == pytest.approx(forward, rel=1e-9)
+
+
+def test_what_leaves_one_integral_and_comes_into_another() -> None:
+    answer = rate("(integral [0, 1] [x < t] d(x)) + (integral [-1, 0] [x < t] d(x))")
+    assert not answer.notes and abs(answer.tangent - 1) <= answer.tangent_error < 1e-12

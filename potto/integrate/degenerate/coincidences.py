@@ -14,6 +14,7 @@ the same (jumps that are added up), that is the derivative; else there are two, 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 
@@ -31,7 +32,6 @@ from potto.integrate.rules.gauss import EPS
 from potto.integrate.rules.substitution import Segments
 from potto.kernels.cells import Array, Bools, Cell, Ints, Mask, Value, pad
 
-MOST_AT_ONE_PLACE = 4
 SURE = 1.001  # what rounding may add to a bound
 # Beside a place, in its own size: where surfaces that are 0 at it, to so many times their rounding, have a side.
 BESIDE, CLEAR = 1e-7, 4.0
@@ -63,36 +63,36 @@ class Scene(Struct, frozen=True):
         return np.isin(owner, mostly(owner, self.root, self.batch)) if self.number else np.ones(owner.size, dtype=bool)
 
     def flips(
-        self, cuts: Sequence[int], owner: Ints, x: Array, above: bool, room: Array | None = None
+        self, cuts: Sequence[int], owner: Ints, x: Array, above: bool, turned: Bools, room: Array | None = None
     ) -> tuple[Array, Array]:
-        """F just beside x with every subset of some cuts' surfaces flipped: (2^n, m, B); bit i stands for cut i.
+        """F just beside x with some cuts' surfaces flipped, and the errors of that, (..., m, B) each.
 
-        And the errors of that, nan where it depends on the side of another surface that rounding hides. Two sections of
-        one surface flip it twice, one at which it only touches 0 not at all. room: (B,) how far it is to the next cut.
+        turned: which of the cuts, (..., n, B), or for all members the same, (..., n, 1). The errors are nan where it
+        depends on the side of another surface that rounding hides. Two sections of one surface flip it twice, one at
+        which it only touches 0 not at all. room: (B,) how far it is to the next cut.
         """
         hidden: dict[int, Bools] = {}
         here, inner = around(self.level, owner, x, above, self.env, self.sides, self.machine, room, hidden)
         _, beyond = around(self.level, owner, x, not above, self.env, self.sides, self.machine, room)
         groups = [group_of(self.level, cut) for cut in cuts]
+        rows, which = _apart_from_one_another(turned)
         found = []
-        for bits in range(1 << len(groups)):
-            flipped = [g for i, g in enumerate(groups) if bits >> i & 1]
-            way = {
-                g: np.asarray(beyond[g]) if groups.count(g) == 1 else ~np.asarray(inner[g])
-                for g in flipped
-                if flipped.count(g) % 2
-            }
-            both = {**inner, **way}
+        for row in rows:
+            both = dict(inner)
+            for g in set(groups):
+                odd = np.bitwise_xor.reduce([row[i] for i, other in enumerate(groups) if other == g])
+                way = np.asarray(beyond[g]) if groups.count(g) == 1 else ~np.asarray(inner[g])
+                both[g] = np.where(odd, way, inner[g])
             f, e = self.inside(owner, here, both)
             for g in hidden.keys() - set(groups):
                 other, _ = self.inside(owner, here, {**both, g: np.asarray(both[g]) ^ hidden[g]})
                 e = np.where(other == f, e, np.nan)
             found.append((f, e))
         m = max(f.shape[0] for f, _ in found)  # one component stands for all where nothing is integrated
-        values, errors = (
-            np.stack([np.broadcast_to(x, (m, owner.size)) for x in own]) for own in zip(*found, strict=True)
-        )
-        return values, errors
+        columns = zip(*found, strict=True)
+        values, errors = (np.stack([np.broadcast_to(x, (m, owner.size)) for x in own]) for own in columns)
+        at = which.reshape(*turned.shape[:-2], -1), slice(None), np.arange(owner.size)
+        return np.moveaxis(values[at], -1, -2), np.moveaxis(errors[at], -1, -2)
 
     def inside(self, owner: Ints, here: dict[str, Value], sides: dict[int, Mask]) -> tuple[Array, Array]:
         """F at places of some members, on the sides given, and its errors, (m, B): a check, for which nothing moves."""
@@ -155,7 +155,7 @@ def count_slivers(scene: Scene, cuts: Cuts, sums: Sums) -> None:
         if not sliver.owner.size:
             continue
         far = room(cuts.segments, sliver.owner, sliver.x)
-        f, _ = scene.flips(sliver.cuts, sliver.owner, sliver.x, not sliver.upper, far)
+        f, _ = scene.flips(sliver.cuts, sliver.owner, sliver.x, not sliver.upper, all_subsets(len(sliver.cuts)), far)
         sums.widen(f.shape[1])
         apart = np.abs(f - f[0]).max(axis=0)
         lost = SURE * apart * sliver.width
@@ -229,43 +229,59 @@ def _not_known(scene: Scene, sums: Sums, owner: Ints, unknown: Bools, named: Two
 
 def at_one_place(scene: Scene, seg: Segments, meeting: Meeting) -> tuple[Array, Array, Array]:
     """What the forward and the backward derivative have beyond that of the merged cut, (m, k, B); and their size."""
-    v, count = meeting.speeds, len(meeting.cuts)
-    if count > MOST_AT_ONE_PLACE:
-        nothing = np.full((1, *v.shape[1:]), np.nan)
-        return nothing, nothing, np.zeros_like(nothing)
-    f, e = scene.flips(meeting.cuts, meeting.owner, meeting.x, False, room(seg, meeting.owner, meeting.x))
-    f = np.where(np.isnan(e), np.nan, f)
-    merged = (f[0] - f[-1])[:, None] * meeting.merged_t
-    found = []
-    for sign in (1, -1):
-        order = np.argsort(sign * v, axis=0, kind="stable")
-        after = np.cumsum(1 << order, axis=0)
-        speed = np.take_along_axis(v, order, axis=0)
-        crossed = [(picked(f, a - (1 << o)) - picked(f, a)) * s for a, o, s in zip(after, order, speed, strict=True)]
-        found.append(np.sum(crossed, axis=0) - merged)
-    scale = np.abs(f).max(axis=0)[:, None] * np.abs(v).max(axis=0)
-    return found[0], found[1], scale
+    v = meeting.speeds
+    order = np.stack([np.argsort(sign * v, axis=0, kind="stable") for sign in (1, -1)])
+    far = room(seg, meeting.owner, meeting.x)
+    f, e = scene.flips(meeting.cuts, meeting.owner, meeting.x, False, one_by_one(order), far)
+    f = np.where(np.isnan(e), np.nan, f)  # (sides, 1 + n, k, m, B)
+    merged = (f[0, 0] - f[0, -1]) * meeting.merged_t[:, None]
+    speed = np.take_along_axis(np.stack([v, v]), order, axis=1)
+    crossed = np.sum((f[:, :-1] - f[:, 1:]) * speed[:, :, :, None], axis=1) - merged
+    forward, backward = np.moveaxis(crossed, 1, 2)
+    scale = np.abs(f).max(axis=(0, 1)) * np.abs(v).max(axis=0)[:, None]
+    return forward, backward, np.moveaxis(scale, 0, 1)
 
 
 def at_a_bound(scene: Scene, seg: Segments, edges: Sequence[Edge]) -> tuple[Array, Array, Array]:
     """What the forward and the backward derivative have beyond that without these surfaces, (m, k, B); their size."""
     first = edges[0]
     inward = np.stack([e.bound_t - e.root_t if e.upper else e.root_t - e.bound_t for e in edges])
-    if len(edges) > MOST_AT_ONE_PLACE:
-        nothing = np.full((1, *inward.shape[1:]), np.nan)
-        return nothing, nothing, np.zeros_like(nothing)
+    speed = np.stack([np.maximum(inward, 0.0), np.maximum(-inward, 0.0)])
+    order = np.argsort(-speed, axis=1, kind="stable")
     far = room(seg, first.owner, first.x)
-    f, e = scene.flips([edge.cut for edge in edges], first.owner, first.x, not first.upper, far)
-    f = np.where(np.isnan(e), np.nan, f)
-    found = []
-    for sign in (1, -1):
-        speed = np.maximum(sign * inward, 0.0)
-        order = np.argsort(-speed, axis=0, kind="stable")
-        after, speed = np.cumsum(1 << order, axis=0), np.take_along_axis(speed, order, axis=0)
-        growth = speed - np.append(speed[1:], np.zeros((1, *speed.shape[1:])), axis=0)
-        gained = [np.where(g > 0, (picked(f, a) - f[0][:, None]) * g, 0.0) for a, g in zip(after, growth, strict=True)]
-        found.append(sign * np.sum(gained, axis=0))
-    return found[0], found[1], np.abs(f[0])[:, None] + np.abs(f[-1])[:, None]
+    f, e = scene.flips([edge.cut for edge in edges], first.owner, first.x, not first.upper, one_by_one(order), far)
+    f = np.where(np.isnan(e), np.nan, f)  # (sides, 1 + n, k, m, B)
+    speed = np.take_along_axis(speed, order, axis=1)
+    growth = (speed - np.append(speed[:, 1:], np.zeros_like(speed[:, :1]), axis=1))[:, :, :, None]
+    gained = np.sum(np.where(growth > 0, (f[:, 1:] - f[:, :1]) * growth, 0.0), axis=1)
+    forward, backward = np.moveaxis(gained, 1, 2)
+    scale = np.abs(f[0, 0]) + np.abs(f[0, -1])
+    return forward, -backward, np.moveaxis(scale, 0, 1)
+
+
+def one_by_one(order: Ints) -> Bools:
+    """Which of n surfaces are flipped when the first 0, 1, …, n are: (sides, 1 + n, k, n, B).
+
+    order: (sides, n, k, B).
+    """
+    rank = np.moveaxis(np.argsort(order, axis=1), 1, 2)[:, None]
+    return np.asarray(rank < np.arange(order.shape[1] + 1)[:, None, None, None])
+
+
+def _apart_from_one_another(turned: Bools) -> tuple[Bools, Ints]:
+    """Of all that may be flipped, (..., n, B), what is not the same for all members, (R, n, B), and which that is for
+    each of them; or all there can be, if these are less."""
+    flat = turned.reshape(math.prod(turned.shape[:-2]), *turned.shape[-2:])
+    rows, which = np.unique(flat, axis=0, return_inverse=True)
+    count = flat.shape[1]
+    if len(rows) <= 1 << count:
+        return rows, which[:, None]
+    return all_subsets(count), np.sum(flat << np.arange(count)[:, None], axis=1)
+
+
+def all_subsets(count: int) -> Bools:
+    """Of n: (2^n, n, 1)."""
+    return (np.arange(1 << count)[:, None, None] >> np.arange(count)[:, None] & 1).astype(bool)
 
 
 def room(seg: Segments, owner: Ints, x: Array) -> Array:
@@ -278,11 +294,6 @@ def room(seg: Segments, owner: Ints, x: Array) -> Array:
             gap = np.abs(end - at)
             np.minimum.at(found, seg.owner, np.where(gap > NARROW * np.abs(at), gap, np.inf))
     return np.asarray(found[owner])
-
-
-def picked(f: Array, bits: Ints) -> Array:
-    """Of F by subsets (2^n, m, B) the one for each direction and member (k, B): (m, k, B)."""
-    return np.moveaxis(f[bits, :, np.arange(bits.shape[1])], -1, 0)
 
 
 def _on_one_bound(edges: Sequence[Edge], batch: int) -> list[list[Edge]]:

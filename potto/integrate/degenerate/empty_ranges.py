@@ -15,8 +15,8 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from potto.integrate.decomposition.meetings import SEARCHED, Row, as_array, tangents
-from potto.integrate.degenerate.coincidences import MOST_AT_ONE_PLACE, Scene, picked
-from potto.integrate.events import CROWDED, EMPTY_UNDEFINED, EMPTY_UNSEEN, Shortfall, TwoSided
+from potto.integrate.degenerate.coincidences import Scene, one_by_one
+from potto.integrate.events import EMPTY_UNDEFINED, EMPTY_UNSEEN, Shortfall, TwoSided
 from potto.integrate.levels import LevelPlan
 from potto.integrate.pieces import Sums
 from potto.integrate.rules.gauss import EPS
@@ -86,17 +86,17 @@ def _by_jumps(jumps: list[Row], x: Array, empty: Bools) -> Iterator[tuple[Ints, 
 def count_collapsed(scene: Scene, found: list[Collapsed], sums: Sums) -> Sums:
     """The sums with what ranges of length zero grow by, and what rounding of their bounds may hide."""
     for ranges in found:
-        if len(ranges.cuts) > MOST_AT_ONE_PLACE:
-            _unknown(scene, ranges, sums, CROWDED)
-            continue
         if ranges.cuts and scene.parent.plan.hides:
             _unknown(scene, ranges, sums, EMPTY_UNSEEN)
             continue
-        f, e = scene.flips(ranges.cuts, ranges.owner, ranges.x, False)
-        sums = sums.widened(f.shape[1])
+        speeds = ranges.speeds if ranges.speeds.shape[1] else np.zeros((len(ranges.cuts), 1, ranges.x.size))
+        order = np.argsort(np.stack([-speeds, speeds]), axis=1, kind="stable")
+        f, e = scene.flips(ranges.cuts, ranges.owner, ranges.x, False, one_by_one(order))
+        sums = sums.widened(f.shape[-2])
         folds = len(set(ranges.cuts)) < len(ranges.cuts)  # what that comes to is known from beside the parameters alone
-        backward, forward = (np.zeros(1) if folds else _growth(f, ranges, sign) for sign in (-1, 1))
-        size, at = np.abs(f).max(axis=0), (slice(None), slice(None), ranges.owner)
+        both = zip(f, order, (-1, 1), strict=True)
+        backward, forward = np.zeros((2, 1)) if folds else (_growth(values, ranges, *which) for values, *which in both)
+        size, at = np.abs(f).max(axis=(0, 1, 2)), (slice(None), slice(None), ranges.owner)
         rates = np.abs(ranges.low) + np.abs(ranges.high)
         differ = np.abs(forward - backward) > 1e-12 * size[:, None] * rates
         if scene.machine.side:
@@ -109,7 +109,7 @@ def count_collapsed(scene: Scene, found: list[Collapsed], sums: Sums) -> Sums:
                 named = TwoSided(scene.level.variable, scene.surface(ranges.cuts[0]))
                 scene.machine.note(named, scene.below(ranges.owner[two]))
         sums.t[at] = growth
-        sums.et[at] = e.max(axis=0)[:, None] * rates + 4 * EPS * np.abs(growth)
+        sums.et[at] = e.max(axis=(0, 1, 2))[:, None] * rates + 4 * EPS * np.abs(growth)
         sums.e[:, ranges.owner] = np.where(ranges.off > 0, size * ranges.off, 0.0)
         _note_gross(sums, ranges.owner, size[:, None] * rates)
         if np.isnan(sums.t[at]).any():
@@ -118,17 +118,15 @@ def count_collapsed(scene: Scene, found: list[Collapsed], sums: Sums) -> Sums:
     return sums
 
 
-def _growth(f: Array, ranges: Collapsed, sign: int) -> Array:
-    """The rate for parameters that grow, or shrink: (components, k, m). f: by subsets of the cuts that lie below."""
+def _growth(f: Array, ranges: Collapsed, order: Ints, sign: int) -> Array:
+    """The rate for parameters that grow, or shrink: (components, k, m). f: with the first 0, 1, … of the cuts in an
+    order passed, (1 + n, k, components, m)."""
     low, high, speeds = sign * ranges.low, sign * ranges.high, sign * ranges.speeds
     first, last = np.minimum(low, high), np.maximum(low, high)
-    order = np.argsort(speeds, axis=0, kind="stable")
-    passed = np.concatenate((np.zeros((1, *low.shape), dtype=np.int64), np.cumsum(1 << order, axis=0)))
     ends = np.clip(np.take_along_axis(speeds, order, axis=0), first, last)
-    lengths = np.diff(np.concatenate((first[None], ends, last[None])), axis=0)
-    stretches = zip(passed, lengths, strict=True)
-    grown = [np.where(length > 0, picked(f, which) * length, 0.0) for which, length in stretches]
-    return np.asarray(sign * np.where(high < low, -1.0, 1.0) * np.sum(grown, axis=0))
+    lengths = np.diff(np.concatenate((first[None], ends, last[None])), axis=0)[:, :, None]
+    grown = np.moveaxis(np.sum(np.where(lengths > 0, f * lengths, 0.0), axis=0), 0, 1)
+    return np.asarray(sign * np.where(high < low, -1.0, 1.0) * grown)
 
 
 def _note_gross(sums: Sums, owner: Ints, rates: Array) -> None:

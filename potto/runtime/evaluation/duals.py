@@ -38,7 +38,7 @@ def call_derivative(
     dual_groups = tuple(
         tuple(merge(arg) for arg in fit(group, arity)) for group, arity in zip(groups, arities, strict=False)
     )
-    value = split(as_a_whole(carrying, lambda own: own.call(primal.padded(1), dual_groups, trace), kinks=True))
+    value = split(as_a_whole(carrying, primal.lam, lambda own: own.call(primal.padded(1), dual_groups, trace)))
     return compared(machine, function.primal, groups, value) if isinstance(function.primal, Derivative) else value
 
 

@@ -11,24 +11,26 @@ from typing import Any
 
 import numpy as np
 
+from potto.calculus.surfaces.trace import spine
+from potto.core.terms import App, Integral, Lam, Term
 from potto.integrate.events import OneSidedDerivatives, TwoSided
 from potto.kernels.cells import Array, Cell, Value, all_cells, map_cells, pad
-from potto.runtime.evaluation.machine import Machine
+from potto.runtime.evaluation.machine import Linker, Machine
 
+DEEPEST = 20  # definitions that a call may lead through
 SAME = 1e-12  # how far apart the derivatives on both sides may be beside their errors, as a part of them
 
 
-def as_a_whole(machine: Machine, run: Callable[[Machine], Value], kinks: bool = False) -> Value:
-    """What `run` gives for a machine. Where parts have two derivatives, those of the whole on both sides are found: if
-    they are the same, that is the derivative, else the nearer one is, and a note tells them.
-
-    kinks: whether only parts outside of integrals ask for that.
+def as_a_whole(machine: Machine, term: Term, run: Callable[[Machine], Value]) -> Value:
+    """What `run` gives for a machine, the value of a term or what the functions that it is give. Where parts have two
+    derivatives, those of the whole on both sides are found: if they are the same, that is the derivative, else the
+    nearer one is, and a note tells them.
     """
     record = machine.record
     known = len(record.edges)
     value = run(machine)
-    met = [edge for edge in record.edges[known:] if not kinks or not edge.cause.variable]
-    if not met or machine.side or machine.taping:
+    met = record.edges[known:]
+    if not met or machine.side or machine.taping or _one_integral(machine.linker, term):
         return value
     kept = dict(record.shortfalls), record.edges[:known], record.within
     value = pad(value, machine.directions)
@@ -36,7 +38,8 @@ def as_a_whole(machine: Machine, run: Callable[[Machine], Value], kinks: bool = 
     record.shortfalls, record.edges, record.within = kept
     (backward, before), (forward, beyond) = sides
     with np.errstate(invalid="ignore"):
-        same = np.abs(forward - backward) <= SAME * (np.abs(forward) + np.abs(backward)) + before + beyond
+        near = np.abs(forward - backward) <= SAME * (np.abs(forward) + np.abs(backward)) + before + beyond
+        same = np.where(np.isfinite(forward) & np.isfinite(backward), near, forward == backward)
         if not same.all():
             where = same.all(axis=(0, 1)) if same.ndim > 2 else np.zeros((), dtype=bool)
             record.edges.append(_note(met[0].cause, where, backward, forward, before, beyond))
@@ -46,6 +49,21 @@ def as_a_whole(machine: Machine, run: Callable[[Machine], Value], kinks: bool = 
         et = np.where(same, np.maximum(before, beyond), np.where(nearer, before, beyond))
     rows = iter(zip(t, et, strict=True))
     return map_cells(value, lambda cell: Cell(cell.v, cell.e, *map(tuple, next(rows))))
+
+
+def _one_integral(linker: Linker, term: Term) -> bool:
+    """Whether a term is nothing but one integral, through the calls around it: then it has told its own derivatives."""
+    for _ in range(DEEPEST):
+        while isinstance(term, Lam):
+            term = term.body
+        if not isinstance(term, App):
+            break
+        head, _ = spine(term)
+        function = linker.function(head)
+        if not isinstance(function, Lam):
+            break
+        term = function
+    return isinstance(term, Integral)
 
 
 def _note(cause: TwoSided, left_out: Any, *sides: Array) -> OneSidedDerivatives:

@@ -24,7 +24,7 @@ def at_kinks(problem: Problem, sums: Sums) -> Sums:
     """Sums, with a note of both derivatives where they differ, and the one that there is where they are the same.
     Integrals further out are told that there may be two."""
     machine = problem.machine
-    if not machine.directions or machine.side or machine.frozen:
+    if not machine.directions or machine.frozen:
         return sums
     found = _surfaces(problem)
     if children(problem.plan().kinks.body) and not machine.exhausted():
@@ -72,6 +72,10 @@ def _noted(problem: Problem, sums: Sums, cause: TwoSided, members: Ints) -> Sums
             (backward, before), (forward, beyond) = (beside(some, d, sign * step, here) for sign in (-1.0, 1.0))
         sides[:, :, d] = backward, forward, before, beyond
     backward, forward, before, beyond = sides
+    if problem.machine.side:
+        t[..., members], off = (forward, beyond) if problem.machine.side > 0 else (backward, before)
+        et[..., members] = np.where(np.isfinite(t[..., members]), off, np.inf)
+        return replace(sums, t=t, et=et)
     with np.errstate(invalid="ignore"):
         same = np.abs(forward - backward) <= SAME * (np.abs(forward) + np.abs(backward)) + before + beyond
         same &= np.isfinite(forward) & np.isfinite(backward)

@@ -114,6 +114,9 @@ def beside_folds(problem: Problem, plan: Plan, sums: Sums) -> None:
             for side, one in zip(edge.sides, (backward, forward, *off), strict=True):
                 if np.shape(side) == sums.t.shape:
                     side[:, d, member] = one
+        if machine.side:
+            t[:], et[:] = _of_side(machine.side, backward, forward, off)
+            continue
         if _same(backward, forward, off[0] + off[1]) and np.isfinite(forward).all():
             known = np.isfinite(t) & (np.abs(t - forward) <= SAME * np.abs(forward) + et)
             t[:], et[:] = np.where(known, t, forward), np.where(known, et, off[0] + off[1])
@@ -140,13 +143,21 @@ def beside_axes(problem: Problem, plan: Plan, sums: Sums, variable: str) -> bool
         t, et = sums.t[:, d, member], sums.et[:, d, member]
         if np.isnan(backward).any() or np.isnan(forward).any():
             return False
-        if _same(backward, forward, off[0] + off[1]) and np.isfinite(forward).all():
+        if machine.side:
+            t[:], et[:] = _of_side(machine.side, backward, forward, off)
+        elif _same(backward, forward, off[0] + off[1]) and np.isfinite(forward).all():
             t[:], et[:] = 0.5 * (backward + forward), np.abs(forward - backward) + off[0] + off[1]
         else:
             et[:] = np.abs(t)
             _endless(machine, backward, forward, t, et)
             machine.note(OneSidedDerivatives(TwoSided(variable), backward, forward, *off))
     return True
+
+
+def _of_side(side: int, backward: Array, forward: Array, off: tuple[Array, Array]) -> tuple[Array, Array]:
+    """The derivative to a side, with its error."""
+    t, et = (forward, off[1]) if side > 0 else (backward, off[0])
+    return t, np.where(np.isfinite(t), et, np.inf)
 
 
 def _endless(machine: Machine, backward: Array, forward: Array, t: Array, et: Array) -> None:
