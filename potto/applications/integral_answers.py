@@ -50,7 +50,7 @@ class Answers:
         try:
             match path:
                 case "/names":
-                    names = [scene.name for scene in scenes(self.world.db, self.file)]
+                    names = [scene.name for scene in scenes(self.world.db, self.file, drawable=False)]
                     return {"names": names, "chosen": self.name or (names[0] if names else "")}
                 case "/open":
                     return self._open(str(asked["name"]))
@@ -107,7 +107,7 @@ class Answers:
         ghost = float(asked.get("ghost") or 0.0) or None  # a step of 0 shows no difference
         start = time.perf_counter()
         with settings(rtol=QUICK) if asked.get("quick") else nullcontext():
-            shot = found.look(values, wrt, which, ghost, bool(asked.get("nodes")))
+            shot = found.look(values, wrt, which, ghost, bool(asked.get("nodes")), bool(asked.get("quick")))
         svg = integral_svg(shot.view, dark=bool(asked.get("dark")))
         seconds = time.perf_counter() - start
         return {

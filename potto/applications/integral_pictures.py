@@ -28,6 +28,7 @@ STYLE = (
 LONGEST = 70.0  # of an arrow
 CELLS = ((222, 233, 247), (253, 236, 214), (226, 243, 224), (244, 226, 241), (250, 246, 205), (228, 228, 228))
 DARK = ((44, 62, 88), (84, 62, 38), (44, 74, 50), (76, 50, 76), (80, 76, 40), (66, 66, 66))
+WAITING = "…"
 DARKER, LIGHTER = 0.35, 0.75  # how much the size of the integrand changes a colour
 
 Said = tuple[str, str]  # a line, and its class
@@ -89,32 +90,34 @@ def integral_svg(view: IntegralView, said: Sequence[Said] = (), dark: bool = Fal
     return "\n".join([head, *ground, *parts, "</svg>", ""])
 
 
-def words(view: IntegralView, numbers: IntegralNumbers, title: str, wrt: str) -> list[Said]:
+def words(view: IntegralView, numbers: IntegralNumbers | None, title: str, wrt: str) -> list[Said]:
     """What stands above and below a picture."""
     found: list[Said] = [(title, "")]
     for name, text in told(view, numbers, wrt):
         found.append((f"{'   ' * (name in ('interior', 'boundary'))}{name} {text}", "quiet" if "diff" in name else ""))
-    if not numbers.converged:
+    if numbers is not None and not numbers.converged:
         found.append(("not as accurate as was asked", "loss"))
     for surface in view.surfaces:
         found.append((surface.equation if surface.lines else f"{surface.equation}: not in the domain", "edge"))
     return [*found, *((text, "quiet") for text in remarks(view))]
 
 
-def told(view: IntegralView, numbers: IntegralNumbers, wrt: str) -> list[tuple[str, str]]:
-    """The numbers with their names and errors."""
+def told(view: IntegralView, numbers: IntegralNumbers | None, wrt: str) -> list[tuple[str, str]]:
+    """The numbers with their names and errors; `…` for one that is not there yet."""
 
     def with_error(value: float, error: float) -> str:
         return f"{format_number(value, error)} ± {format_digits(error, 2)}"
 
+    names = ("value", f"derivative by {wrt}", "interior", "boundary")
+    if numbers is None:
+        return [(name, WAITING) for name in (*names, "central difference:")]
     n = numbers
-    return [
-        ("value", with_error(n.value, n.error)),
-        (f"derivative by {wrt}", with_error(n.tangent, n.tangent_error)),
-        ("interior", with_error(n.interior, n.interior_error)),
-        ("boundary", with_error(n.boundary, n.boundary_error)),
-        (f"central difference, {wrt} ± {format_digits(n.step, 2)}:", format_digits(n.difference, 8)),
-    ]
+    pairs = ((n.value, n.error), (n.tangent, n.tangent_error), (n.interior, n.interior_error),
+             (n.boundary, n.boundary_error))  # fmt: skip
+    found = [(name, with_error(*pair)) for name, pair in zip(names, pairs, strict=True)]
+    if n.difference is None:
+        return [*found, ("central difference:", WAITING)]
+    return [*found, (f"central difference, {wrt} ± {format_digits(n.step, 2)}:", format_digits(n.difference, 8))]
 
 
 def remarks(view: IntegralView) -> list[str]:

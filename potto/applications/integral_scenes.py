@@ -5,6 +5,7 @@ Owns `IntegralScene`, which the command, the page in a browser and editors share
 
 from __future__ import annotations
 
+import time
 from collections.abc import Mapping
 
 from msgspec import Struct
@@ -12,23 +13,25 @@ from msgspec import Struct
 from potto.applications.integral_pictures import integral_svg, words
 from potto.applications.integral_views import IntegralNumbers, IntegralView, Viewer, numbers
 from potto.checking.regions import Region, regions
+from potto.core.terms import ZERO, Lam, Term, app, lam, tuple_, var
 from potto.diagnostics import PottoError
+from potto.elaborate import core, elaborate_expression
 from potto.evaluating.world import World
-from potto.ide.display.scenes import Scene, scene
+from potto.ide.display.scenes import Scene, SceneParameter, scene
 from potto.kernels.errors import wrong_call
 from potto.modules import DefinitionTarget, resolve
-from potto.python.functions import Function
+from potto.python.terms import TermFunction
 from potto.types import groups_of, interface
-from potto.types.types import Function as FunctionType
 
 UNSAID = 0.5  # what a number is that nobody gives
+PATIENCE = 0.1  # seconds: numbers that take longer wait until nothing is dragged any more, and the picture goes on
 
 
 class Shot(Struct, frozen=True):
-    """One look: what is seen, and the numbers."""
+    """One look: what is seen, and the numbers, if there was time for them."""
 
     view: IntegralView
-    numbers: IntegralNumbers
+    numbers: IntegralNumbers | None
     title: str
     wrt: str
 
@@ -42,7 +45,7 @@ class IntegralScene:
     """The integrals of one function. Raises PottoError if there is no such function, or it has no integral.
 
     given: texts for parameters; the others start as a live expression gives them. `values` has the numbers by name, a
-    tuple's as `p_1`, `p_2`.
+    tuple's as `p_1`, `p_2`, a record's as `p.field`.
     """
 
     def __init__(self, world: World, file: str, name: str, given: Mapping[str, str]) -> None:
@@ -60,19 +63,19 @@ class IntegralScene:
             raise wrong_call(f"`{name}` has no parameter `{unknown[0]}`",
                              f"its parameters are {', '.join(p.name for p in found.parameters)}")  # fmt: skip
         self.values: dict[str, float] = {}
-        arguments = self._arguments(found, given)
-        type = interface(world.db, target.file, target.name).type
-        call = name
-        for group in groups_of(type):
-            call += f"({', '.join(arguments.pop(0) for _ in group)})"
-        self.text = f"\\({', '.join(self.values)}) . {call}"
+        arguments = iter(self._arguments(found, given))
+        call = core(world.db, target.file, target.name).term
+        for group in groups_of(interface(world.db, target.file, target.name).type):
+            call = app(call, tuple(next(arguments) for _ in group))
+        self.term = lam(tuple(self.values), call)
         self._regions: dict[str, tuple[Region, ...]] = {}
         self._viewers: dict[tuple[str, int], Viewer] = {}
-        self._functions: dict[str, Function] = {}
+        self._took: dict[tuple[str, int], float] = {}  # seconds that numbers took last
+        self._functions: dict[Lam, TermFunction] = {}
 
-    def _arguments(self, found: Scene, given: Mapping[str, str]) -> list[str]:
-        """What is written for each parameter; `values` is filled on the way."""
-        texts: list[str] = []
+    def _arguments(self, found: Scene, given: Mapping[str, str]) -> list[Term]:
+        """What each parameter is given; `values` is filled on the way."""
+        terms: list[Term] = []
         for parameter in found.parameters:
             said = given.get(parameter.name)
             if parameter.kind == "function":
@@ -80,14 +83,25 @@ class IntegralScene:
                 if not text:
                     raise wrong_call(f"`{parameter.name}` is a function, {parameter.type}", "give it one: "
                                      f"`{parameter.name}=\\(x) . x`")  # fmt: skip
-                texts.append(f"({text})")
+                tree, _ = self.world.typed(self.file, text)
+                terms.append(elaborate_expression(self.world.db, self.file, tree).term)
                 continue
-            numbers = self._given(said, parameter.size) if said else parameter.value or (UNSAID,) * parameter.size
-            single = parameter.kind == "number"
-            names = [parameter.name if single else f"{parameter.name}_{n + 1}" for n in range(parameter.size)]
+            numbers = self._given(said, parameter.size) if said else self._usual(parameter)
+            names = [parameter.name, *(f"{parameter.name}.{field}" for field in parameter.fields)]
+            if parameter.kind != "number":
+                names = names[1:] or [f"{parameter.name}_{n + 1}" for n in range(parameter.size)]
             self.values.update(zip(names, numbers, strict=True))
-            texts.append(names[0] if single else f"({', '.join(names)})")
-        return texts
+            terms.append(var(names[0]) if parameter.kind == "number" else tuple_(map(var, names)))
+        return terms
+
+    def _usual(self, parameter: SceneParameter) -> tuple[float, ...]:
+        """What a live expression gives to a parameter, be it written as numbers or not."""
+        if parameter.text and not parameter.value:
+            try:
+                return self._given(parameter.text, parameter.size)
+            except PottoError:
+                pass
+        return parameter.value or (UNSAID,) * parameter.size
 
     def _stands(self, text: str) -> bool:
         """Whether an expression means something in the file: an offer may need an import that is not there yet."""
@@ -110,8 +124,7 @@ class IntegralScene:
             raise wrong_call(f"`{self.name}` has no number `{wrt}` to differentiate by",
                              f"its numbers are {', '.join(self.values)}")  # fmt: skip
         if wrt not in self._regions:
-            tree, _ = self.world.typed(self.file, self.text)
-            found = regions(self.world.db, self.file, tree, wrt)
+            found = regions(self.world.db, self.term, wrt)
             if not found:
                 raise wrong_call(f"`{self.name}` has no integral to look at", "name a function with an integral that "
                                  "depends on nothing but its parameters")  # fmt: skip
@@ -124,27 +137,33 @@ class IntegralScene:
         for name in self.values:
             for region in self.regions(name):
                 rates = [*(surface.rate for surface in region.surfaces), *(r for pair in region.rates for r in pair)]
-                if any(not rate.endswith(" . 0") for rate in rates):
+                if any(rate.body is not ZERO for rate in rates):
                     return name
         return next(iter(self.values))
 
     def look(
-        self, values: Mapping[str, float], wrt: str, which: int = 0, ghost: float | None = None, nodes: bool = False
-    ) -> Shot:
+        self, values: Mapping[str, float], wrt: str, which: int = 0, ghost: float | None = None, nodes: bool = False,
+        quick: bool = False,
+    ) -> Shot:  # fmt: skip
         """The integral number `which`, from 0, with these values; `ghost`: the step of what is seen of differences,
-        `nodes`: also where it was evaluated. Raises PottoError where it has no value."""
+        `nodes`: also where it was evaluated. A `quick` one is coarser, and without numbers where these took too long
+        the last time. Raises PottoError where it has no value."""
         known = self.regions(wrt)
         if not 0 <= which < len(known):
             raise wrong_call(f"`{self.name}` has {len(known)} integrals", f"choose one from 1 to {len(known)}")
-        viewer = self._viewers.setdefault((wrt, which), Viewer(known[which], self._compiled))
-        seen = viewer.look(values, wrt, ghost or 0.0, nodes)
-        found = numbers(known[which], self._compiled, values, wrt, ghost)
+        key = wrt, which
+        viewer = self._viewers.setdefault(key, Viewer(known[which], self._compiled))
+        seen = viewer.look(values, wrt, ghost or 0.0, nodes, quick)
+        found = None
+        if not quick or self._took.get(key, 0.0) <= PATIENCE:
+            start = time.perf_counter()
+            found = numbers(known[which], self._compiled, values, wrt, ghost, quick)
+            if quick:
+                self._took[key] = time.perf_counter() - start
         title = f"{self.name}({', '.join(f'{name} = {value:.4g}' for name, value in values.items())})"
         return Shot(seen, found, title, wrt)
 
-    def _compiled(self, text: str) -> Function:
-        if text not in self._functions:
-            tree, type = self.world.typed(self.file, text)
-            assert isinstance(type, FunctionType)
-            self._functions[text] = Function(self.world, self.file, tree, type)
-        return self._functions[text]
+    def _compiled(self, term: Lam) -> TermFunction:
+        if term not in self._functions:
+            self._functions[term] = TermFunction(self.world, self.file, term)
+        return self._functions[term]

@@ -15,15 +15,14 @@ from msgspec import Struct
 
 from potto.applications.contours import zero_lines
 from potto.checking.regions import Region, RegionSurface
-from potto.core.terms import Lam
+from potto.core.terms import ZERO, Const, Lam
 from potto.kernels.cells import Array, Cell, Value
-from potto.python.functions import Function
-from potto.python.gradients import grad
+from potto.python.terms import TermFunction
 from potto.runtime.answers.estimate import Estimate
 from potto.runtime.evaluation.machine import WATCHING
 
 PLACES = 257  # along a curve
-SIDE = 97  # along a side of a square
+SIDE, QUICK_SIDE = 97, 49  # along a side of a square; while something is dragged
 REACH = 6.0  # how far an endless range is drawn
 ARROWS = 24  # of one surface, at most
 NODES = 1500
@@ -31,7 +30,7 @@ STEP = 1e-3  # of the parameter, or of 1 where that is more
 TINY = 1e-13
 PARTS, CLOSER = 64, 10  # a root is looked for in so many parts, so often: its ends are neighbours then
 
-Call = Callable[..., Any]
+Compile = Callable[[Lam], TermFunction]
 Point = tuple[float, ...]
 Line = tuple[Point, Point]
 
@@ -60,8 +59,8 @@ class IntegralView(Struct, frozen=True):
     """What there is to see of an integral for one choice of its parameters.
 
     box: from and to of each variable that is seen. cells: at the places of `integrand` the number of the cell, one for
-    each way that the surfaces can be on their sides; -1 outside of the domain. integrand: PLACES numbers, or rows of
-    SIDE from below. held: the variables that are not seen, and where they stand. ghosts: where surfaces and bounds are
+    each way that the surfaces can be on their sides; -1 outside of the domain. integrand: PLACES numbers, or rows
+    from below. held: the variables that are not seen, and where they stand. ghosts: where surfaces and bounds are
     when the parameter is a step less, and a step more. nodes: where the integrand was evaluated for the value.
     """
 
@@ -80,7 +79,7 @@ class IntegralView(Struct, frozen=True):
 class IntegralNumbers(Struct, frozen=True):
     """An integral and its derivative by the parameter that moves, each with its error. interior: what the derivative is
     while surfaces and bounds stand still; boundary: the rest. difference: the central difference over `step` to both
-    sides, a ghost to hold the derivative against, and how far errors of values may move it."""
+    sides, a ghost to hold the derivative against, and how far errors of values may move it; None if nobody asked."""
 
     value: float
     error: float
@@ -90,48 +89,58 @@ class IntegralNumbers(Struct, frozen=True):
     interior_error: float
     boundary: float
     boundary_error: float
-    difference: float
+    difference: float | None
     difference_error: float
     step: float
     converged: bool
     evals: int
 
 
-def numbers(region: Region, compile: Callable[[str], Function], given: Mapping[str, float], wrt: str,
-            step: float | None = None) -> IntegralNumbers:  # fmt: skip
-    """The integral and its derivative by `wrt`, and a difference over `step`. Raises PottoError where there is none."""
+def numbers(
+    region: Region, compile: Compile, given: Mapping[str, float], wrt: str, step: float | None = None,
+    quick: bool = False,
+) -> IntegralNumbers:  # fmt: skip
+    """The integral and its derivative by `wrt`, and a difference over `step`; if it is to be quick, that only where a
+    step is named. Raises PottoError where there is none."""
     whole = compile(region.whole)
-    both = grad(whole, [wrt])(**given)
+    at = [given[name] for name in region.whole.params]
+    both = whole.gradient(wrt, *at)
     still = _constant(region.interior)
-    inner = compile(region.interior)(**given) if still is None else Estimate(still, 0.0)
+    inner = compile(region.interior)(*at) if still is None else Estimate(still, 0.0)
     rest, error = both.tangent - inner.value, both.tangent_error + inner.error
     if abs(rest) <= max(error, TINY * max(abs(both.tangent), abs(inner.value))):
         rest, error = 0.0, error if rest else 0.0
-    step = STEP * max(1.0, abs(given[wrt])) if step is None else step
-    beside = whole(**{**given, wrt: given[wrt] + step * np.array([-1.0, 1.0])})
+    difference, off, evals = None, 0.0, both.evals + inner.evals
+    if step is not None or not quick:
+        step = STEP * max(1.0, abs(given[wrt])) if step is None else step
+        sides = {**given, wrt: given[wrt] + step * np.array([-1.0, 1.0])}
+        beside = whole(*(sides[name] for name in region.whole.params))
+        difference, off = float(np.diff(beside.value)[0]) / (2 * step), float(np.sum(beside.error)) / (2 * step)
+        evals += beside.evals
     return IntegralNumbers(
         float(both.value), float(both.error), float(both.tangent), float(both.tangent_error),
-        float(inner.value), float(inner.error), float(rest), float(error),
-        float(np.diff(beside.value)[0]) / (2 * step), float(np.sum(beside.error)) / (2 * step), step,
-        bool(both.converged and inner.converged), both.evals + inner.evals + beside.evals,
+        float(inner.value), float(inner.error), float(rest), float(error), difference, off, step or 0.0,
+        bool(both.converged and inner.converged), evals,
     )  # fmt: skip
 
 
 class Viewer:
-    """Looks at one integral. compile: the function that a text of the region stands for, of numbers and arrays."""
+    """Looks at one integral. compile: makes a function of numbers and arrays of a term of the region."""
 
-    def __init__(self, region: Region, compile: Callable[[str], Call]) -> None:
+    def __init__(self, region: Region, compile: Compile) -> None:
         self.region = region
-        self._compile = compile
-        self._calls: dict[str, Call] = {}
+        self._compiled = compile
         self.seen = region.variables[:2]
 
-    def look(self, given: Mapping[str, float], wrt: str = "", ghost: float = 0.0, nodes: bool = False) -> IntegralView:
-        """The view with these parameters; with ghosts for steps of `wrt`, and nodes, if they are wanted. Raises
-        PottoError where the integrand has no value."""
+    def look(
+        self, given: Mapping[str, float], wrt: str = "", ghost: float = 0.0, nodes: bool = False, quick: bool = False
+    ) -> IntegralView:
+        """The view with these parameters; with ghosts for steps of `wrt`, and nodes, if they are wanted; a `quick` one
+        is coarser. Raises PottoError where the integrand has no value."""
         places: dict[str, Any] = {**given, **dict.fromkeys(self.region.variables, 0.0)}
         box, held, cut = self._ranges(places)
-        grids = [np.linspace(low, high, PLACES if len(box) == 1 else SIDE) for low, high in box]
+        count = PLACES if len(box) == 1 else QUICK_SIDE if quick else SIDE
+        grids = [np.linspace(low, high, count) for low, high in box]
         at = {**places, **self._mesh(grids)}
         inside = self._inside(at)
         values = self._numbers(self.region.integrand, at)
@@ -161,7 +170,7 @@ class Viewer:
             there = {**places, wrt: places[wrt] + way}
             found: list[Line] = []
             for surface in self.region.surfaces:
-                if surface.rate.endswith(" . 0"):
+                if surface.rate.body is ZERO:
                     continue
                 level = self._numbers(surface.level, {**there, **self._mesh(grids)})
                 ends = self._roots(surface, level, grids[0], there) if len(grids) == 1 else zero_lines(level, *grids)
@@ -170,7 +179,7 @@ class Viewer:
                     found += _lines(ends[np.nonzero(self._inside({**there, **middles}))[0]])
             for axis in range(len(self.seen)):
                 for low_or_high, rate in zip(self.region.bounds[axis], self.region.rates[axis], strict=True):
-                    if not rate.endswith(" . 0"):
+                    if rate.body is not ZERO:
                         found += _edge(self._number(low_or_high, there), axis, grids)
             sides.append(tuple(found))
         return sides[0], sides[1]
@@ -193,7 +202,7 @@ class Viewer:
         whole = self._compiled(self.region.whole)
         token = WATCHING.set(watch)
         try:
-            whole(**given)
+            whole(*(given[name] for name in self.region.whole.params))
         finally:
             WATCHING.reset(token)
         if not met:
@@ -205,35 +214,30 @@ class Viewer:
 
     # Numbers
 
-    def _numbers(self, text: str, at: Mapping[str, Any]) -> Array:
-        plain = _constant(text)
+    def _numbers(self, term: Lam, at: Mapping[str, Any]) -> Array:
+        plain = _constant(term)
         if plain is not None:
             return np.full(np.broadcast_shapes(*(np.shape(at[name]) for name in self.region.names)), plain)
-        call = self._compiled(text)
+        call = self._compiled(term)
         arguments = np.broadcast_arrays(*(np.asarray(at[name], dtype=float) for name in self.region.names))
         answer = call(*(a if a.ndim else float(a) for a in arguments))
         found: Array = np.broadcast_to(np.asarray(answer.value, dtype=float), arguments[0].shape)
         return found
 
-    def _compiled(self, text: str) -> Call:
-        if text not in self._calls:
-            self._calls[text] = self._compile(text)
-        return self._calls[text]
-
-    def _number(self, text: str, at: Mapping[str, Any]) -> float:
-        return float(self._numbers(text, at))
+    def _number(self, term: Lam, at: Mapping[str, Any]) -> float:
+        return float(self._numbers(term, at))
 
     def _ranges(self, places: dict[str, Any]) -> tuple[list[tuple[float, float]], list[tuple[str, float]], bool]:
         """The box of what is seen, and the middles of the others; `places` is given the middles of all."""
         box: list[tuple[float, float]] = []
         held: list[tuple[str, float]] = []
         cut = False
-        for name, (low_text, high_text) in zip(self.region.variables, self.region.bounds, strict=True):
+        for name, (from_, to) in zip(self.region.variables, self.region.bounds, strict=True):
             at = dict(places)
             if box and name in self.seen:  # a bound that bends: all of what it reaches
                 first = self.seen[0]
                 at[first] = np.linspace(*box[0], SIDE)
-            lows, highs = self._numbers(low_text, at), self._numbers(high_text, at)
+            lows, highs = self._numbers(from_, at), self._numbers(to, at)
             low, high = float(np.min(lows)), float(np.max(highs))
             cut = cut or not np.isfinite([low, high]).all()
             low, high = _drawn(low, high)
@@ -261,9 +265,12 @@ class Viewer:
         middles = ends.mean(axis=1)
         at = {**places, **dict(zip(self.seen, middles.T, strict=True))}
         keep = self._inside(at)
-        slopes = np.stack([self._numbers(text, at) for text, _ in zip(surface.slopes, self.seen, strict=False)], axis=1)
+        slopes = np.stack(
+            [self._numbers(slope, at) for slope, _ in zip(surface.slopes, self.seen, strict=False)], axis=1
+        )
         steep = np.linalg.norm(slopes, axis=1)
-        rate, jump = self._numbers(surface.rate, at), self._numbers(surface.jump, at)
+        rate = self._numbers(surface.rate, at)
+        jump = np.zeros_like(rate) if surface.jump is None else self._numbers(surface.jump, at)
         keep &= steep > 0
         safe = np.where(steep > 0, steep, 1.0)
         weights = np.where(keep, jump * rate / safe, 0.0)
@@ -274,7 +281,7 @@ class Viewer:
         around = middles[chosen] - middles[chosen].mean(axis=0) if len(chosen) else middles[chosen]
         order = np.argsort(np.arctan2(around[:, -1], around[:, 0]), kind="stable")
         shown = chosen[order][:: max(1, -(-len(chosen) // ARROWS))]
-        arrows = _arrows(middles[shown], velocities[shown], weights[shown])
+        arrows = () if surface.jump is None else _arrows(middles[shown], velocities[shown], weights[shown])
         return SurfaceView(surface.equation, lines, arrows, float(np.sum(weights * lengths)))
 
     def _roots(self, surface: RegionSurface, level: Array, xs: Array, places: Mapping[str, Any]) -> Array:
@@ -314,12 +321,9 @@ class Viewer:
         return tuple(found)
 
 
-def _constant(text: str) -> float | None:
-    """The number that a function gives everywhere, if it is written as one."""
-    try:
-        return float(text.rpartition(" . ")[2])
-    except ValueError:
-        return None
+def _constant(term: Lam) -> float | None:
+    """The number that a function gives everywhere, if that is what it is."""
+    return term.body.value if isinstance(term.body, Const) else None
 
 
 def _lines(ends: Array) -> tuple[Line, ...]:

@@ -1,7 +1,7 @@
 """The integrals of a function as regions that can be drawn: bounds, integrand, and what its surfaces do.
 
-Owns `regions`. Everything is a function of the function's parameters and the variables of integration, as Potto writes
-it, so that numbers come from whoever evaluates programs. What a surface gains is its jump, from its negative to its
+Owns `regions`. Everything is a term over the function's parameters and the variables of integration, so that numbers
+come from whoever evaluates programs. What a surface gains is its jump, from its negative to its
 positive side, times its rate: how fast its condition grows as the chosen parameter does.
 """
 
@@ -16,107 +16,150 @@ from potto.calculus.differentiation.boundary_terms import jumps
 from potto.calculus.differentiation.dual import Differentiator
 from potto.calculus.explanation.explain import equation
 from potto.calculus.explanation.plain_names import plainly_named
-from potto.checking.written_out import written_out
-from potto.core.printer import format_term
+from potto.checking.written_out import carried_out
 from potto.core.simplify import simplify
 from potto.core.terms import (
     ONE,
+    ZERO,
     App,
+    Branch,
+    Delta,
+    If,
     Integral,
+    Lam,
+    Proj,
     Term,
+    Tuple,
+    branch,
     children,
-    integral,
+    if_,
+    lam,
     postorder,
+    proj,
+    transform,
+    with_integrand,
 )
 from potto.elaborate import core
 from potto.query import Database
-from potto.syntax import nodes
 
 _COPY = re.compile(r"'\d+")  # the mark of a copy of a bound variable
 
 
 class RegionSurface(Struct, frozen=True):
     """A surface: its equation, and as functions its condition, its rate, how that grows along each variable, and the
-    jump of the integrand where the condition turns positive."""
+    jump of the integrand where the condition turns positive; that is None where a delta is, whose height has no end."""
 
     equation: str
-    level: str
-    rate: str
-    slopes: tuple[str, ...]
-    jump: str
+    level: Lam
+    rate: Lam
+    slopes: tuple[Lam, ...]
+    jump: Lam | None
 
 
 class Region(Struct, frozen=True):
-    """An integral: all texts are functions of `names`, the parameters and then the variables.
+    """An integral of a number: all terms are functions of `names`, the parameters and then the variables.
 
-    bounds, rates: of each variable from and to, and how fast these move. A bound may name the variables before it.
+    bounds, rates: of each variable from and to, and how fast these move. A bound may depend on the variables before it.
     whole, interior: functions of the parameters alone, the integral and what it gains while surfaces and bounds stand
-    still.
+    still. integrand: without deltas.
     """
 
     names: tuple[str, ...]
     variables: tuple[str, ...]
-    bounds: tuple[tuple[str, str], ...]
-    rates: tuple[tuple[str, str], ...]
-    integrand: str
-    whole: str
-    interior: str
+    bounds: tuple[tuple[Lam, Lam], ...]
+    rates: tuple[tuple[Lam, Lam], ...]
+    integrand: Lam
+    whole: Lam
+    interior: Lam
     surfaces: tuple[RegionSurface, ...]
 
 
-def regions(db: Database, file: str, expr: nodes.Expr, wrt: str) -> tuple[Region, ...]:
-    """The outermost integrals of a function, in order; `wrt` is the parameter that moves.
+def regions(db: Database, term: Term, wrt: str) -> tuple[Region, ...]:
+    """The outermost integrals of a function, in order; `wrt` is the parameter that moves. Of one that is a tuple there
+    is a region for each number.
 
     What depends on what is bound outside of it, as an integral in a sum, is left out. Raises PottoError where an
     integrand has no derivative in symbols.
     """
-    params, whole = written_out(db, file, expr)
+    params, whole = carried_out(db, term)
     work = Differentiator(lambda g: core(db, g.module, g.name).term, folding=True)
     known = frozenset(params)
-    return tuple(_region(node, tuple(params), work, wrt) for node in _outermost(whole) if node.free <= known)
+    return tuple(
+        _region(part, tuple(params), work, wrt)
+        for node in _outermost(whole)
+        if node.free <= known
+        for part in _numbers(node)
+    )
 
 
 def _outermost(whole: Term) -> Iterator[Integral]:
+    """The integrals that are in no other one; where one number of a tuple is used, that of this number."""
     stack, seen = [whole], set[Term]()
     while stack:
         node = stack.pop()
         if node in seen:
             continue
         seen.add(node)
-        if isinstance(node, Integral):
+        of = node.term if isinstance(node, Proj) else node
+        if isinstance(node, Proj) and isinstance(of, Integral):
+            yield with_integrand(of, _part(of.body, node.index))
+        elif isinstance(node, Integral):
             yield node
         else:
             stack.extend(reversed(children(node)))
+
+
+def _numbers(node: Integral) -> list[Integral]:
+    """An integral of a tuple as those of its numbers."""
+    width = _width(node.body)
+    return [with_integrand(node, _part(node.body, place)) for place in range(width)] if width else [node]
+
+
+def _width(term: Term) -> int:
+    """Of how many numbers a term is a tuple; 0 if it is a number."""
+    while isinstance(term, If | Branch):
+        term = term.then
+    return len(term.items) if isinstance(term, Tuple) else 0
+
+
+def _part(term: Term, place: int) -> Term:
+    """A number of a tuple, taken inside of what decides between tuples."""
+    if isinstance(term, If):
+        return if_(term.condition, _part(term.then, place), _part(term.orelse, place))
+    if isinstance(term, Branch):
+        return branch(term.coordinates, term.strict, _part(term.then, place), _part(term.orelse, place))
+    return proj(term, place)
 
 
 def _region(node: Integral, params: tuple[str, ...], work: Differentiator, wrt: str) -> Region:
     node = plainly_named(node, params)
     names = (*params, *node.variables)
 
-    def text(term: Term, over: tuple[str, ...] = names) -> str:
-        return f"\\({', '.join(over)}) . {format_term(simplify(term))}"
+    def over(term: Term, names: tuple[str, ...] = names) -> Lam:
+        return lam(names, simplify(term))
 
-    def interior() -> Term:
-        return integral(node.variables, node.bounds, work.dual(node.body, {wrt: ONE})[1])
+    def along(term: Term, name: str) -> Term:
+        return work.dual(term, {name: ONE})[1]
 
-    def along(term: Term, name: str) -> str:
-        return text(work.dual(term, {name: ONE})[1])
+    def surface(level: Term, jump: Lam | None) -> RegionSurface:
+        where = _COPY.sub("", equation(simplify(level)))
+        slopes = tuple(over(along(level, name)) for name in node.variables)
+        return RegionSurface(where, over(level), over(along(level, wrt)), slopes, jump)
 
-    found: list[RegionSurface] = []
-    for item in jumps(node.body, node.variables, lambda term: ONE):
-        if item.sums or any(isinstance(inner, App) for inner in postorder(item.surface)):
-            continue
-        slopes = tuple(along(item.surface, name) for name in node.variables)
-        where = _COPY.sub("", equation(simplify(item.surface)))
-        rate = along(item.surface, wrt)
-        found.append(RegionSurface(where, text(item.surface), rate, slopes, text(item.jump)))
+    deltas = dict.fromkeys(part.coordinates[0] for part in postorder(node.body) if isinstance(part, Delta))
+    drawn = with_integrand(node, transform(node.body, lambda _, new: ZERO if isinstance(new, Delta) else new))
+    found = [
+        surface(item.surface, over(item.jump))
+        for item in jumps(drawn.body, node.variables, lambda term: ONE)
+        if not item.sums and not any(isinstance(inner, App) for inner in postorder(item.surface))
+    ]
     return Region(
         names,
         node.variables,
-        tuple((text(low), text(high)) for low, high in node.bounds),
-        tuple((along(low, wrt), along(high, wrt)) for low, high in node.bounds),
-        text(node.body),
-        text(node, params),
-        text(interior(), params),
-        tuple(found),
+        tuple((over(low), over(high)) for low, high in node.bounds),
+        tuple((over(along(low, wrt)), over(along(high, wrt))) for low, high in node.bounds),
+        over(drawn.body),
+        over(node, params),
+        over(with_integrand(drawn, along(drawn.body, wrt)), params),
+        (*found, *(surface(level, None) for level in deltas)),
     )

@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
+from msgspec import Struct
 
-from potto.applications.integral_scenes import IntegralScene, Shot
+from potto.applications import integral_scenes
+from potto.applications.integral_pictures import told
+from potto.applications.integral_scenes import IntegralScene
+from potto.applications.integral_views import IntegralNumbers, IntegralView
 from potto.diagnostics import PottoError
 from potto.evaluating.world import World
 
@@ -22,16 +27,33 @@ def shaded(c, shader) integral ([0, 1], [0, 1]) [x + y + c >= 0]*shader(x, y) d(
 def both(a, b) integral [0, 1] a*[x < b] d(x)
 def pair(k, p: (Real, Real)) integral [0, fst(p)] snd(p)*x d(x)
 def two(t) (integral [0, 1] [x < t] d(x)) + (integral [0, 1] [x < t^2] d(x))
+def part(c) integral [0, 1] (if [x < c] then (1, x) else (0, 2)) d(x)
+def second(c) part(c).1
+def on(c) integral [0, 1] delta(x - c)*x^2 d(x)
+record Step(at: Real, height: Real)
+low = Step(0.25, 3)
+def rise(s: Step) integral [0, 1] (if [x < s.at] then 0 else s.height) d(x)
+#> rise(low)
+def raised(at) rise(low with at = at)
 def plain(t) t^2
 lost = 1 + nothing
 """
 
 
-def looked(name: str, wrt: str, which: int = 0, shader: str = "", **values: float) -> Shot:
+class Looked(Struct):
+    view: IntegralView
+    numbers: IntegralNumbers
+    title: str
+    svg: str
+
+
+def looked(name: str, wrt: str, which: int = 0, shader: str = "", **values: float) -> Looked:
     world = World()
     file = world.put("program.po", PROGRAM)
     scene = IntegralScene(world, file, name, {"shader": shader} if shader else {})
-    return scene.look({**scene.values, **values}, wrt, which)
+    shot = scene.look({**scene.values, **values}, wrt, which)
+    assert shot.numbers is not None
+    return Looked(shot.view, shot.numbers, shot.title, shot.svg)
 
 
 def test_a_step_is_a_point_that_gains_what_is_left_of_it() -> None:
@@ -112,6 +134,58 @@ def test_interior_and_boundary_are_told_apart() -> None:
 def test_numbers_of_a_tuple_move_apart() -> None:
     assert looked("pair", "p_1", k=0, p_1=0.5, p_2=3).numbers.tangent == pytest.approx(1.5)
     assert looked("pair", "p_2", k=0, p_1=0.5, p_2=3).numbers.tangent == pytest.approx(0.125)
+
+
+def test_of_an_integral_of_a_tuple_each_number_is_seen() -> None:
+    """(c, c^2/2 + 2*(1 - c)): what gains c - 2 where x = c."""
+    assert looked("part", "c", 0, c=0.5).numbers.tangent == pytest.approx(1)
+    for shot in (looked("part", "c", 1, c=0.5), looked("second", "c", c=0.5)):
+        assert shot.numbers.value == pytest.approx(1.125)
+        assert shot.numbers.boundary == pytest.approx(-1.5)
+        assert shot.view.surfaces[0].arrows[0].weight == pytest.approx(-1.5)
+
+
+def test_a_record_moves_by_its_fields_and_begins_as_a_live_expression_gives_it() -> None:
+    """height*(1 - at)"""
+    shot = looked("rise", "s.at")
+    assert shot.title == "rise(s.at = 0.25, s.height = 3)"
+    assert shot.numbers.value == pytest.approx(2.25)
+    assert shot.numbers.boundary == pytest.approx(-3)
+    assert looked("rise", "s.height").numbers.interior == pytest.approx(0.75)
+    assert looked("raised", "at", at=0.5).numbers.value == pytest.approx(1.5)
+
+
+def test_a_delta_is_a_line_without_a_height() -> None:
+    """c^2, all of it on the line"""
+    shot = looked("on", "c", c=0.5)
+    (surface,) = shot.view.surfaces
+    assert (surface.equation, len(surface.lines)) == ("c = x", 1)
+    assert not surface.arrows
+    assert shot.numbers.value == pytest.approx(0.25)
+    assert shot.numbers.interior == 0
+    assert shot.numbers.boundary == pytest.approx(1)
+
+
+def test_what_another_module_keeps_to_itself_is_looked_at(tmp_path: Path) -> None:
+    (tmp_path / "inner.po").write_text(
+        "def bump(x, t) (if [x < t] then x else 1)\ndef area(t) integral [0, 1] bump(x, t) d(x)\n"
+    )
+    (tmp_path / "outer.po").write_text("from inner import area\ndef a(t) 2*area(t)\n")
+    world = World([str(tmp_path)])
+    scene = IntegralScene(world, str(tmp_path / "outer.po"), "a", {})
+    numbers = scene.look({"t": 0.5}, "t").numbers
+    assert numbers is not None and numbers.boundary == pytest.approx(-0.5)
+
+
+def test_where_numbers_take_too_long_the_picture_goes_on_without(monkeypatch: pytest.MonkeyPatch) -> None:
+    world = World()
+    scene = IntegralScene(world, world.put("program.po", PROGRAM), "disc", {})
+    for patience, quick, known in ((0.0, True, True), (0.0, True, False), (10.0, True, True), (0.0, False, True)):
+        monkeypatch.setattr(integral_scenes, "PATIENCE", patience)
+        shot = scene.look({"r": 0.7}, "r", quick=quick)
+        assert (shot.numbers is not None) == known
+        assert shot.view.surfaces[0].gain == pytest.approx(2 * math.pi * 0.7, rel=1e-2)
+        assert (told(shot.view, shot.numbers, "r")[0] == ("value", "…")) != known
 
 
 def test_each_of_several_integrals_is_one_of_its_own() -> None:

@@ -91,7 +91,7 @@ def offers(ask: Ask, file: str, name: str) -> Iterator[protocol.Command]:
 def _has_picture(ask: Ask, scene: ide.Scene | None) -> bool:
     """Whether a function can be drawn: one of one or two numbers, also with functions that are known. A client that
     draws by itself can show others, too."""
-    if scene is None:
+    if scene is None or not scene.axes:
         return False
     numbers = [p for p in scene.parameters if p.kind == "number"]
     known = all(p.kind == "number" or p.fits for p in scene.parameters)

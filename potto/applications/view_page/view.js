@@ -89,7 +89,7 @@ const titleOf = (name, values) =>
 const say = (text) => { $("said").textContent = text; };
 function tell(found, whole) {
   const time = $("time");
-  time.textContent = `${(found.seconds * 1000).toFixed(1)} ms${found.slow ? ", more than a frame" : ""}`;
+  time.textContent = `${(found.seconds * 1000).toFixed(1)} ms${found.slow ? ", more than a frame" : ""}${found.numbers ? "" : ", numbers when you let go"}`;
   time.title = `${whole.toFixed(1)} ms until it was drawn`;
   time.classList.toggle("slow", found.slow);
   time.dataset.frames = String(1 + Number(time.dataset.frames ?? 0));
@@ -109,14 +109,16 @@ function show(figure, shot, beside) {
   const picture = make("div");
   picture.innerHTML = shot.svg;
   const list = make("ul", { className: "list" }, ...shot.surfaces.map(surfaceName), ...shot.remarks.map((text) => make("li", { textContent: text })));
-  if (!shot.numbers.converged) list.prepend(make("li", { textContent: "not as accurate as was asked" }));
+  if (shot.numbers?.converged === false) list.prepend(make("li", { textContent: "not as accurate as was asked" }));
   figure.replaceChildren(make("figcaption", { textContent: shot.title }), picture, table, list);
   light(lit);
 }
 
 const KEYS = ["value", "tangent", "interior", "boundary", "difference"];
 function difference(shot, other, place) {
-  const by = shot.numbers[KEYS[place]] - other.numbers[KEYS[place]];
+  const [here, there] = [shot, other].map(({ numbers }) => numbers?.[KEYS[place]] ?? null);
+  if (here === null || there === null) return "";
+  const by = here - there;
   return `Δ ${by < 0 ? "−" : "+"}${Math.abs(by).toPrecision(3)}`;
 }
 

@@ -1,6 +1,6 @@
 """What can be drawn: functions of numbers with values for their parameters. Owns `scenes`.
 
-A scene is a function of which two numbers can be the axes of a picture, or one that of a curve; all other parameters
+A function can be drawn of which two numbers can be the axes of a picture, or one that of a curve; all other parameters
 are for the viewer to set. They start as a live expression of the file calls the function, if one does.
 """
 
@@ -41,7 +41,7 @@ Arguments = tuple[tuple[str | int, Given], ...]
 class SceneParameter(Struct, frozen=True):
     """A parameter. `size`: how many numbers it has, 0 for a function; `reach`: the least and the largest number that
     live expressions give it, if they give it several; `fits`: texts of functions that it could be given, the one to
-    begin with first."""
+    begin with first; `text`: what a live expression gives it, as it is written; `fields`: of a record their names."""
 
     name: str
     kind: Literal["number", "tuple", "function"]
@@ -50,10 +50,13 @@ class SceneParameter(Struct, frozen=True):
     value: tuple[float, ...] = ()
     fits: tuple[str, ...] = ()
     reach: tuple[float, float] | None = None
+    text: str = ""
+    fields: tuple[str, ...] = ()
 
 
 class Scene(Struct, frozen=True):
-    """A function that can be drawn: `components` numbers at each place, over the parameters in `axes` to begin with."""
+    """A function of numbers: `components` numbers at each place, over the parameters in `axes` to begin with. One whose
+    parameters are tuples has no axes."""
 
     name: str
     span: Span
@@ -62,13 +65,14 @@ class Scene(Struct, frozen=True):
     axes: tuple[str, ...]
 
 
-def scenes(db: Database, file: str) -> tuple[Scene, ...]:
-    """The functions of a file that can be drawn, in order."""
+def scenes(db: Database, file: str, drawable: bool = True) -> tuple[Scene, ...]:
+    """The functions of a file that can be drawn, in order; or all functions of numbers."""
     return tuple(
         [
             replace(drawn, span=drawn.span.shift(at.start))
             for at in pieces_of(db, file)
             for drawn in piece_scenes(db, file, at.text, at.hidden)
+            if drawn.axes or not drawable
         ]
     )
 
@@ -106,10 +110,20 @@ def scene(db: Database, file: str, name: str) -> Scene | None:
         if kind == "function" and written.text and not wrong_with(db, file, written.text):
             usable = tuple(dict.fromkeys((written.text, *usable)))
         made.append(
-            SceneParameter(parameter.name, kind, format_type(parameter.type), size, value, usable, reach(everywhere))
+            SceneParameter(
+                parameter.name,
+                kind,
+                format_type(parameter.type),
+                size,
+                value,
+                usable,
+                reach(everywhere),
+                written.text,
+                _fields(parameter.type),
+            )
         )
     axes = _axes([parameter.name for parameter in made if parameter.kind == "number"])
-    return Scene(name, NOWHERE, tuple(made), components, axes) if axes else None
+    return Scene(name, NOWHERE, tuple(made), components, axes)
 
 
 def reach(given: list[Given]) -> tuple[float, float] | None:
@@ -124,6 +138,11 @@ def _kind(type: Type) -> tuple[Literal["number", "tuple", "function"] | None, in
         return "function", 0
     size = numbers(type)
     return ("number" if size == 1 and not isinstance(type, TupleOf) else "tuple" if size else None), size
+
+
+def _fields(type: Type) -> tuple[str, ...]:
+    type = resolve(type)
+    return type.record.fields if isinstance(type, TupleOf) and type.record is not None else ()
 
 
 def _axes(numbers: list[str]) -> tuple[str, ...]:
