@@ -24,6 +24,7 @@ _DIFFERENTIAL = re.compile(rf"\bd ?({FIRST_NAME.pattern})")
 _DIFFERENTIALS = re.compile(rf"(?:{_DIFFERENTIAL.pattern}[ *]*)+\Z")
 """`dx`, `d x` or `dx dy`, as mathematics writes it."""
 
+_BRACKET = re.compile(r"#[^\n]*|[()\[\]]")
 _DIFFERENTIATES = re.compile(r"\s*d\s*\(")
 
 
@@ -118,6 +119,9 @@ class Nesting:
         written = _DIFFERENTIALS.search(self.text, max(opener.start, last - 40), last)
         meant = f"d({', '.join(_DIFFERENTIAL.findall(written[0]))})" if written else ""
         word = "∫" if self.text[opener.start] == "∫" else "integral"
+        if any(d.span.start == opener.start for d in self.diagnostics):  # its bounds are missing: it is being typed
+            self.tokens += [Token(kind, "", last, last) for kind in ("D", "LPAR", "RPAR")]
+            return
         self.report(
             kinds.NO_DIFFERENTIAL(
                 Span(opener.start, opener.start + len(word)),
@@ -145,9 +149,11 @@ class Nesting:
 
     def close_bracket(self, kind: str, word: str, start: int, end: int) -> None:
         """A closing bracket: adds its token, mended if it is the wrong one, or none if nothing is open."""
-        if not self.brackets:
+        if not self.brackets or self._is_stray(kind, end):
+            opening = _CHARACTER["LPAR" if kind == "RPAR" else "LSQB"]
             self.report(
-                kinds.BRACKETS(Span(start, end), f"this `{word}` closes nothing", help=f"take the `{word}` out",
+                kinds.BRACKETS(Span(start, end), f"this `{word}` closes nothing: no `{opening}` is open here",
+                               help=f"take it out, or write the `{opening}` before it",
                                suggestions=take_out(self.text, Span(start, end)))
             )  # fmt: skip
             return
@@ -171,6 +177,20 @@ class Nesting:
         self.ranges.discard(len(self.brackets))
         self.brackets.pop()
         self.tokens.append(Token(wanted, word, start, end))
+
+    def _is_stray(self, kind: str, end: int) -> bool:
+        """Whether a closing bracket is of a kind that is not open, and what is open is closed further on without it."""
+        if any(_CLOSER[bracket.kind] == kind for bracket in self.brackets):
+            return False
+        depth, wanted = 0, _CHARACTER[_CLOSER[self.brackets[-1].kind]]
+        for found in _BRACKET.finditer(self.text, end):
+            if found[0] in "([":
+                depth += 1
+            elif found[0] in ")]":
+                if not depth:
+                    return found[0] == wanted
+                depth -= 1
+        return False
 
     def close_unclosed(self, before: int) -> None:
         """Close the innermost bracket ahead of `before`, since the text never does."""

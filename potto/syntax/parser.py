@@ -79,6 +79,7 @@ def parse_chunk(text: str, diffeo: bool = False) -> ParsedChunk:
     elsewhere = foreign_integral(text, lexed.tokens, diagnostics) if diagnostics and foreign is None else None
     if elsewhere is not None:
         item, diagnostics = None, _only(elsewhere, diagnostics)
+    diagnostics = _without_consequences(diagnostics)
     if item is None:
         item = _salvage(text, lexed.tokens, diffeo)
     return ParsedChunk(item, _sorted(diagnostics), comments)
@@ -96,12 +97,25 @@ def parse_expression(text: str) -> ParsedExpression:
     elsewhere = foreign_integral(text, lexed.tokens, diagnostics) if diagnostics else None
     if elsewhere is not None:
         expr, diagnostics = None, _only(elsewhere, diagnostics)
-    return ParsedExpression(expr if expr is not None else broken, _sorted(diagnostics))
+    return ParsedExpression(expr if expr is not None else broken, _sorted(_without_consequences(diagnostics)))
 
 
 def _only(said: Diagnostic, found: list[Diagnostic]) -> list[Diagnostic]:
     """A message that says all of what follows, and those ahead of it."""
     return [*(d for d in found if d.span.end <= said.span.start), said]
+
+
+def _without_consequences(found: list[Diagnostic]) -> list[Diagnostic]:
+    """Where one closing bracket closes nothing, its partner may be missing: what was said of the text before it is
+    about what that leaves behind. Bounds are counted where nothing else is wrong with them or with the integrand."""
+    bounds = [d for d in found if d.code == kinds.BOUNDS.code and d.related]
+    others = [d.span.start for d in found if d not in bounds]
+    doubtful = [d for d in bounds if any(d.related[0].span.start <= at < d.span.end for at in others)]
+    found = [d for d in found if d not in doubtful]
+    stray = [d for d in found if d.code == kinds.BRACKETS.code and not d.related]
+    if len(stray) != 1:
+        return found
+    return [d for d in found if d.span.start >= stray[0].span.start]
 
 
 def completeness(text: str, diffeo: bool = False) -> Literal["complete", "incomplete", "wrong"]:

@@ -1,4 +1,4 @@
-"""Brackets that an integrand never closes end before the `d(x)` of its integral; nothing else is said of them."""
+"""A missing bracket, one too many and a missing comma in integrals and lists: one mistake is one message."""
 
 from __future__ import annotations
 
@@ -44,3 +44,20 @@ def test_one_that_is_missing_in_a_definition_is_one_mistake(text: str) -> None:
 def test_several_are_missing() -> None:
     found = parse_expression("integral [0, 1] (x*(1 + [x < 1 d(x)").diagnostics
     assert [said.code for said in found] == ["P0102"] * 3
+
+
+@pytest.mark.parametrize(
+    ("text", "said", "place"),
+    [
+        ("def lamp(lx) lx, 0.4, 3)", "this `)` closes nothing: no `(` is open here", 23),
+        ("arrow = [(0.1, 0.1), 0.2, 0.9), (0.4, 0.45)]", "this `)` closes nothing: no `(` is open here", 29),
+        ("def mean(xs: [n] ] Real) sum x in xs (x) / n", "this `]` closes nothing: no `[` is open here", 17),
+        ("def inner(t) integral [0, 1] insidex, t) d(x)", "this `)` closes nothing: no `(` is open here", 39),
+        ("def inner(t) integral ([0 1], [0, 1]) x*y d(x, y)", "an interval has two ends", 23),
+        ("def inner(t) integral ([0, 1], [0, t]) x*y d(x y)", "`x y` is not a name: a variable of integration", 45),
+        ("def inner(t) 2*integral", "expected the bounds after `integral`", 15),
+    ],
+)
+def test_one_bracket_too_many_or_one_comma_too_few_is_one_mistake(text: str, said: str, place: int) -> None:
+    (found,) = parse_chunk(text).diagnostics
+    assert found.message.startswith(said) and found.span.start == place
