@@ -20,7 +20,7 @@ from potto.source import Span
 from potto.syntax import nodes
 from potto.types import interface
 from potto.types.context import ensure_stack
-from potto.types.types import groups_of
+from potto.types.types import Type, groups_of
 
 Locals = Iterable[str | tuple[str, Term]]
 Names = tuple[str, ...]
@@ -98,14 +98,18 @@ def diffeo_core(db: Database, file: str, name: str) -> DiffeoCore | None:
     return _diffeo(Elaboration(db, file), item) if isinstance(item, nodes.DiffeoDefinition) else None
 
 
-def elaborate_expression(db: Database, file: str, expr: nodes.Expr, locals: Locals = ()) -> Elaborated:
+def elaborate_expression(
+    db: Database, file: str, expr: nodes.Expr, locals: Locals = (), types: tuple[tuple[str, Type], ...] = ()
+) -> Elaborated:
     """The core term of an expression with a file's names in scope.
 
     `locals` are further names: one alone stays a free variable, `(name, term)` stands for the term.
+    `types` are those of free variables that stand for more than a number.
     """
     ensure_stack()
     with db.evaluating():
         elaboration, scope = _opened(db, file, locals)
+        elaboration.shapes.names.update(types)
         return _finished(elaboration, elaboration.term(expr, scope))
 
 

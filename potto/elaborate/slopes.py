@@ -20,7 +20,18 @@ from potto.source import Span
 from potto.syntax import nodes
 from potto.syntax.written import without_parentheses
 from potto.types import infer_expression
-from potto.types.types import REAL, ArrayOf, Function, Parameter, TupleOf, Type, groups_of, holds_functions, resolve
+from potto.types.types import (
+    REAL,
+    ArrayOf,
+    Function,
+    Parameter,
+    TupleOf,
+    Type,
+    groups_of,
+    holds_functions,
+    resolve,
+    result_of,
+)
 
 NOWHERE = Span(0, 0)
 Along = Callable[[Term], Term]
@@ -29,7 +40,8 @@ Along = Callable[[Term], Term]
 
 def slope(elaboration: Elaboration, form: str, node: nodes.Apply, function: Value) -> Value:
     """What `D(f, …)` or `grad(f, …)` stands for, where f is `function`."""
-    groups = groups_of(_type_of(elaboration, function))
+    whole = _type_of(elaboration, function)
+    groups = groups_of(whole)
     if isinstance(function, Var) and not groups:  # a parameter of which nothing else is known
         groups = ((Parameter(None, REAL),),)
     parameters = [parameter for group in groups for parameter in group]
@@ -41,7 +53,7 @@ def slope(elaboration: Elaboration, form: str, node: nodes.Apply, function: Valu
     if not written:
         moving = [place for place, p in enumerate(parameters) if not holds_functions(p.type)]
         places = [0] if form == "D" else moving
-    return _Slope(elaboration, groups, elaboration.as_term(function)).by(places)
+    return _Slope(elaboration, groups, result_of(whole), elaboration.as_term(function)).by(places)
 
 
 def _type_of(elaboration: Elaboration, value: Value) -> Type:
@@ -72,13 +84,19 @@ def _lambda_of(closure: Closure) -> nodes.Expr:
 class _Slope:
     """One function being differentiated."""
 
-    def __init__(self, elaboration: Elaboration, groups: Sequence[tuple[Parameter, ...]], function: Term) -> None:
-        self.elaboration, self.groups, self.function = elaboration, groups, function
-        self.names = [tuple(elaboration.fresh(p.name or "x") for p in group) for group in groups]
+    def __init__(
+        self, elaboration: Elaboration, groups: Sequence[tuple[Parameter, ...]], result: Type, function: Term
+    ) -> None:
+        self.elaboration, self.groups, self.result, self.function = elaboration, groups, result, function
+        self.names = [self.named(group) for group in groups]
         self.types = [resolve(parameter.type) for group in groups for parameter in group]
         self.variables = [var(name) for group in self.names for name in group]
-        for variable, type in zip(self.variables, self.types):
-            elaboration.shapes.names[variable.name] = type
+
+    def named(self, group: Sequence[Parameter]) -> tuple[str, ...]:
+        """Fresh names for a group of parameters, of their types."""
+        names = tuple(self.elaboration.fresh(p.name or "x") for p in group)
+        self.elaboration.shapes.names.update(zip(names, [resolve(p.type) for p in group], strict=True))
+        return names
 
     def by(self, places: Sequence[int]) -> Term:
         """The function of all derivatives by the parameters at these places, in the shape of the parameters."""
@@ -92,7 +110,27 @@ class _Slope:
         made: Term = deriv(self.function)
         for group in self.groups:
             made = app(made, tuple(next(duals) for _ in group))
-        return proj(made, 1)
+        return self.tangent(made, self.result)
+
+    def tangent(self, dual: Term, type: Type) -> Term:
+        """The tangent of a dual; where there are functions in the value, its parts are duals side by side."""
+        type = resolve(type)
+        if not holds_functions(type):
+            return proj(dual, 1)
+        match type:
+            case TupleOf(items):
+                return shaped(
+                    self.elaboration, type, [self.tangent(proj(dual, place), item) for place, item in enumerate(items)]
+                )
+            case ArrayOf(_, item):
+                place = self._place()
+                return array(place, length(dual), self.tangent(index(dual, var(place)), item))
+            case Function(parameters, result):
+                names = self.named(parameters)
+                resting = tuple(self.dual(var(n), p.type, None) for n, p in zip(names, parameters, strict=True))
+                return lambdas((names,), self.tangent(app(dual, resting), result))
+            case _:
+                return proj(dual, 1)
 
     def each(self, type: Type, term: Term, along: Along) -> Term:
         """A derivative for each number of a parameter, or of a part of it."""

@@ -15,6 +15,7 @@ from potto.diagnostics import declare
 from potto.evaluating.world import World
 from potto.reports.render import ProgramError
 from potto.runtime.answers.estimate import Estimate
+from potto.runtime.answers.named import Named
 from potto.runtime.answers.printing import holds, written_tolerance
 from potto.runtime.answers.shown import format_answer, interval
 from potto.syntax import live_expressions, nodes
@@ -67,7 +68,9 @@ def agrees(estimate: Estimate, wanted: Estimate, written: nodes.Expr) -> bool:
     if estimate.text is not None or wanted.text is not None:
         return False
     found, expected = list(_numbers(estimate)), list(_numbers(wanted))
-    tolerances = list(_tolerances(written))
+    if any(value is None for value, _ in found):  # a function, which is not compared
+        return False
+    tolerances = list(_tolerances(written, wanted.value))
     if len(tolerances) != len(expected):  # no tuple of numbers but an expression: exact
         tolerances = [0.0] * len(expected)
     return _form(estimate) == _form(wanted) and all(
@@ -76,18 +79,18 @@ def agrees(estimate: Estimate, wanted: Estimate, written: nodes.Expr) -> bool:
     )
 
 
-def _numbers(estimate: Estimate) -> Iterator[tuple[float, float]]:
+def _numbers(estimate: Estimate) -> Iterator[tuple[Any, Any]]:
     yield from _flat(estimate.value, estimate.error)
     if estimate.tangent is not None:
         yield from _flat(estimate.tangent, estimate.tangent_error)
 
 
-def _flat(value: Any, error: Any) -> Iterator[tuple[float, float]]:
+def _flat(value: Any, error: Any) -> Iterator[tuple[Any, Any]]:
     if isinstance(value, tuple | list):
         for part, bound in zip(value, error, strict=True):
             yield from _flat(part, bound)
     else:
-        yield float(value), float(error)
+        yield value, error
 
 
 def _form(estimate: Estimate) -> Any:
@@ -101,14 +104,19 @@ def _shape(value: Any) -> Any:
     return tuple(map(_shape, value)) if isinstance(value, tuple | list) else None
 
 
-def _tolerances(written: nodes.Expr) -> Iterator[float]:
+def _tolerances(written: nodes.Expr, value: Any) -> Iterator[float]:
+    """By how much each number that was written may be off; `value` is what it comes to."""
     match written:
         case nodes.Number(text=text):
             yield written_tolerance(text)
         case nodes.Unary(operand=inner) | nodes.Paren(inner=inner):
-            yield from _tolerances(inner)
-        case nodes.Tuple(items=items) | nodes.ListLiteral(items=items):
-            for item in items:
-                yield from _tolerances(item)
+            yield from _tolerances(inner, value)
+        case nodes.Tuple(items=items) | nodes.ListLiteral(items=items) if isinstance(value, tuple | list):
+            for item, part in zip(items, value, strict=False):
+                yield from _tolerances(item, part)
+        case nodes.Apply(arguments=arguments) if isinstance(value, Named) and len(arguments) == len(value):
+            given = {value.fields[i] if a.name is None else a.name: a.value for i, a in enumerate(arguments)}
+            for name, part in zip(value.fields, value, strict=True):
+                yield from _tolerances(given[name], part)
         case _:
             yield 0.0

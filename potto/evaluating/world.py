@@ -25,7 +25,7 @@ from potto.modules import chunk_start
 from potto.projects.settings import Settings, current
 from potto.reports.render import Located, ProgramError
 from potto.runtime.answers.estimate import Estimate
-from potto.runtime.answers.shown import as_dual, gives_dual
+from potto.runtime.answers.shown import as_dual, gives_dual, named_answer
 from potto.runtime.evaluate import Program
 from potto.runtime.script import Script, Shown, placed, remarks
 from potto.source import SourceText, Span
@@ -157,6 +157,7 @@ class World(Library):
             estimate = self.program.evaluate(elaborated.term, chosen)
             if gives_dual(elaborated.term, self.program.linker):
                 estimate = as_dual(estimate)
+            estimate = named_answer(estimate, inferred.type)
         except ProgramError:
             raise
         except PottoError as error:

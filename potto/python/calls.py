@@ -20,12 +20,14 @@ from potto.python.arguments import Batch
 from potto.python.at_once import AtOnce, at_once
 from potto.reports.render import Located, ProgramError
 from potto.runtime.answers.estimate import Estimate
-from potto.runtime.answers.shown import as_dual, gives_dual
+from potto.runtime.answers.shown import as_dual, gives_dual, named_answer
 from potto.runtime.evaluate import Clock, report
 from potto.runtime.evaluation.machine import Machine
 from potto.source import Span
 from potto.syntax import nodes
 from potto.types import infer_expression
+from potto.types.types import Function as FunctionType
+from potto.types.types import Type
 
 NOWHERE = Span(0, 0)
 Form = tuple[tuple[int, tuple[str, ...]], ...]
@@ -40,6 +42,7 @@ class Call(Struct, frozen=True, eq=False):
     form: Form
     _known: dict[int, Term] = {}
     _dual: dict[int, bool] = {}
+    _result: dict[int, Type] = {}
 
     def run(self, values: Sequence[Value], batch: Batch) -> Estimate:
         """The estimate of the call for these arguments. Raises PottoError."""
@@ -47,7 +50,7 @@ class Call(Struct, frozen=True, eq=False):
         with Clock() as clock:
             value = self.value(values, machine)
         estimate = report(value, machine, clock)
-        return batch.shaped(as_dual(estimate) if self._gives_dual() else estimate)
+        return named_answer(batch.shaped(as_dual(estimate) if self._gives_dual() else estimate), self.result)
 
     def at_once(self, args: tuple[Any, ...], wrt: tuple[str, ...] = ()) -> Estimate | None:
         """The estimate for plain numbers near those of before, with its derivatives by the parameters named; None
@@ -72,12 +75,25 @@ class Call(Struct, frozen=True, eq=False):
         revision = self.world.db.revision
         if revision not in self._dual:
             term = self.elaborated
-            body = (
-                term.body if sum(count + len(words) for count, words in self.form) and isinstance(term, Lam) else term
-            )
+            body = term.body if self._given and isinstance(term, Lam) else term
             self._dual.clear()
             self._dual[revision] = gives_dual(body, self.world.program.linker)
         return self._dual[revision]
+
+    @property
+    def result(self) -> Type:
+        """The type of the answer; found out once for the present texts."""
+        revision = self.world.db.revision
+        if revision not in self._result:
+            whole = infer_expression(self.world.db, self.file, applied(self.expr, self.form)).type
+            self._result.clear()
+            self._result[revision] = whole.result if isinstance(whole, FunctionType) and self._given else whole
+        return self._result[revision]
+
+    @property
+    def _given(self) -> int:
+        """How many arguments the call has."""
+        return sum(count + len(words) for count, words in self.form)
 
     def value(self, values: Sequence[Value], machine: Machine | None = None) -> Value:
         """The value of the call for these arguments. Raises PottoError."""

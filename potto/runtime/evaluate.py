@@ -198,7 +198,7 @@ def report(value: Value, machine: Machine, clock: Clock) -> Estimate:
         return answer(values, off, tangent, tangent_error, converged=not missing, shortfalls=missing)
     numbers, bounds = told(value, lambda cell: cell.v), told(value, lambda cell: bar(cell.e))
     tangents = tangent_bounds = None
-    if any(cell.t for cell in all_cells(value)):
+    if any(cell.t for cell in all_cells(_without_functions(value))):
         tangents = told(value, lambda cell: cell.t[0] if cell.t else None)
         tangent_bounds = told(value, lambda cell: bar(cell.et[0]) if cell.t else None)
     shown = _flat(numbers, told(value, lambda cell: cell.e))  # nan of nan is another reason than inf of nan
@@ -234,12 +234,21 @@ def stats_of(record: Record, clock: Clock) -> dict[str, Any]:
     return stats
 
 
+def _without_functions(value: Value) -> Value:
+    """What of a value is numbers: what its functions have captured is not told."""
+    if isinstance(value, tuple):
+        return tuple([_without_functions(item) for item in value])
+    return () if isinstance(value, Closure) else value
+
+
 def _slopes(value: Value) -> list[tuple[Any, Any]]:
     """All tangents with their errors."""
     if isinstance(value, Rows):
         return [pair for row in value.rows() for pair in _slopes(row)] if any(c.t for c in all_cells(value)) else []
     if isinstance(value, tuple | list):
         return [pair for item in value for pair in _slopes(item)]
+    if isinstance(value, Closure):
+        return []
     return [(number(t), number(bar(et))) for c in all_cells(value) for t, et in zip(c.t, c.et, strict=True)]
 
 
@@ -279,13 +288,15 @@ def _notes(record: Record) -> list[OneSided]:
 
 
 def told(value: Value, part: Callable[[Cell], Number | None]) -> Any:
-    """One part of all numbers, in the form of the value; 0 where it is missing."""
+    """One part of all numbers, in the form of the value; 0 where it is missing, None for a function."""
     if isinstance(value, Cell):
         return number(part(value))
     if isinstance(value, tuple | list):
         return type(value)([told(item, part) for item in value])
     if isinstance(value, Rows):
         return told_rows(value, part)
+    if isinstance(value, Closure):
+        return None
     raise errors.not_a_number(value)
 
 

@@ -25,18 +25,22 @@ from potto.projects.settings import Settings
 from potto.query import Database
 from potto.reports.render import Located, ProgramError
 from potto.runtime.answers.estimate import Estimate
-from potto.runtime.answers.shown import as_dual, format_answer, format_value, gives_dual
+from potto.runtime.answers.named import named
+from potto.runtime.answers.shown import as_dual, format_answer, format_value, gives_dual, named_answer
 from potto.runtime.evaluate import Clock, Program, report
 from potto.runtime.evaluation.functions import Closure
 from potto.runtime.evaluation.machine import Machine
 from potto.source import Span
 from potto.syntax import nodes
+from potto.types import infer_expression
+from potto.types.types import ArrayOf, TupleOf, Type, Unknown
 
 NOT_CONVERGED = declare("P0501", "an estimate that is not as accurate as was asked", "warning")
 NO_NUMBER = declare("P0524", "an answer that is not a number", "warning")
 ONE_SIDED = declare("P0522", "a derivative that differs on the two sides of the parameters", "info")
 
 Environment = dict[str, Value]
+Types = tuple[tuple[str, Type], ...]  # of the names of an environment
 
 
 class Shown(Struct, frozen=True):
@@ -57,6 +61,7 @@ class Script:
         self.program = program
         self.settings = settings
         self.start = 0
+        self.locals: dict[str, Type] = {}
 
     def run(self) -> Iterator[Shown | Located]:
         """Run all statements but those that an error in the program spoils, which gives that error. One of evaluation
@@ -67,6 +72,7 @@ class Script:
             if wrong:
                 yield from wrong
                 continue
+            self.locals = {}
             try:
                 yield from self.statement(reference.statement, {})
             except _Failed as failure:
@@ -80,6 +86,7 @@ class Script:
             case nodes.ExpressionStatement(value=value, span=span):
                 yield from self.show(span, (value,), env)
             case nodes.For(variable=variable, iterable=iterable, body=body):
+                self.locals[variable.name] = _item(self.type(iterable))
                 for item in self.items(iterable, env):
                     inner = {**env, variable.name: item}
                     for inside in body:
@@ -93,10 +100,12 @@ class Script:
         kept: Value | None = None
         for argument in arguments:
             value, estimate = self.value(argument, env)
-            texts.append(format_value(value) if estimate is None else format_answer(estimate))
+            type = self.type(argument)
+            estimate = None if estimate is None else named_answer(estimate, type)
+            texts.append(format_value(named(value, type)) if estimate is None else format_answer(estimate))
             if estimate is not None:
                 estimates.append(estimate)
-                kept = value if len(arguments) == 1 else None
+                kept = value if len(arguments) == 1 and not _has_functions(value) else None
                 place = argument.span.shift(self.start)
                 yield from (Located(self.file, d) for d in remarks(estimate, place))
         yield Shown(span.shift(self.start), " ".join(texts), tuple(estimates), kept)
@@ -112,6 +121,8 @@ class Script:
     def bind(self, binding: nodes.Binding, env: Environment) -> None:
         value, _ = self.value(binding.value, env)
         targets = binding.targets
+        types = _parts(self.type(binding.value), len(targets))
+        self.locals |= {target.name: type for target, type in zip(targets, types, strict=True)}
         if len(targets) == 1:
             env[targets[0].name] = value
             return
@@ -127,13 +138,22 @@ class Script:
         place = expr.span
         try:
             with Clock() as clock:
-                value, dual = evaluate_in(self.db, self.file, expr, env, self.program, machine)
-            if _has_functions(value):
+                value, dual = evaluate_in(self.db, self.file, expr, env, self.program, machine, self.known)
+            if isinstance(value, Closure):
                 return value, None
             estimate = report(value, machine, clock)
             return value, as_dual(estimate) if dual else estimate
         except PottoError as error:
             raise self.failed(error, place) from None
+
+    def type(self, expr: nodes.Expr) -> Type:
+        """The type of an expression where loops and assignments have come to."""
+        return infer_expression(self.db, self.file, expr, self.known).type
+
+    @property
+    def known(self) -> Types:
+        """The types of what loops and assignments have named."""
+        return tuple(self.locals.items())
 
     def failed(self, error: PottoError, place: Span) -> _Failed:
         """An error of evaluation, at the place of what was evaluated."""
@@ -143,11 +163,11 @@ class Script:
 
 
 def evaluate_in(
-    db: Database, file: str, expr: nodes.Expr, env: Environment, program: Program, machine: Machine
+    db: Database, file: str, expr: nodes.Expr, env: Environment, program: Program, machine: Machine, types: Types
 ) -> tuple[Value, bool]:
-    """The value of an expression that may use the file's names and those of an environment, and whether it is that of
-    a derivative. Raises PottoError."""
-    term = elaborate_expression(db, file, expr, tuple(env)).term
+    """The value of an expression that may use the file's names and those of an environment, which are of `types`, and
+    whether it is that of a derivative. Raises PottoError."""
+    term = elaborate_expression(db, file, expr, tuple(env), types).term
     value = program.value(machine, term, {n: v for n, v in env.items() if n in term.free})
     return value, gives_dual(term, program.linker, env)
 
@@ -191,6 +211,18 @@ def _has_functions(value: Value) -> bool:
     if isinstance(value, tuple | list):
         return any(map(_has_functions, value))
     return isinstance(value, Closure)
+
+
+def _item(type: Type) -> Type:
+    """The type of what an array has."""
+    return type.item if isinstance(type, ArrayOf) else Unknown()
+
+
+def _parts(type: Type, count: int) -> tuple[Type, ...]:
+    """The types of what so many names are given."""
+    if count == 1:
+        return (type,)
+    return type.items if isinstance(type, TupleOf) and len(type.items) == count else (Unknown(),) * count
 
 
 class _Failed(Exception):

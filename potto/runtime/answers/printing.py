@@ -17,6 +17,8 @@ from typing import Any
 
 from msgspec import Struct
 
+from potto.runtime.answers.named import Named
+
 ROUNDING = 8 * 2.0**-52  # a few rounding errors: what remains of an error estimate of zero
 MISSED = "not converged: "  # stands in front of an answer that missed its tolerance
 # The roughest accuracy that is proposed, and how much worse it is than what was reached: asked for less, integration
@@ -215,7 +217,7 @@ def _joined(value: Any, error: Any, form: Callable[[float, float], str]) -> str:
     if isinstance(value, tuple | list):
         shown = value[:MOST_ITEMS] if isinstance(value, list) else value
         parts = [_joined(v, e, form) for v, e in zip(shown, error, strict=False)]
-        return format_tuple(parts) if isinstance(value, tuple) else format_list(parts, len(value))
+        return _together(value, parts) if isinstance(value, tuple) else format_list(parts, len(value))
     if isinstance(value, dict):
         return format_fields({name: _joined(item, error[name], form) for name, item in value.items()})
     if value is None:
@@ -223,6 +225,11 @@ def _joined(value: Any, error: Any, form: Callable[[float, float], str]) -> str:
     if getattr(value, "ndim", 0):
         return _rows(value, error, form)
     return form(float(value), float(error))
+
+
+def _together(whole: tuple[Any, ...], parts: Sequence[str]) -> str:
+    """A tuple or a record of its parts as texts."""
+    return whole.written(parts) if isinstance(whole, Named) else format_tuple(parts)
 
 
 def _rows(value: Any, error: Any, form: Callable[[float, float], str]) -> str:
@@ -246,7 +253,7 @@ def with_error(value: Any, error: Any) -> str:
     """`0.300 ± 0.012`, `(0.300, 1) ± (0.012, 0)`; without the error where it is zero or not known."""
     if not 0 < largest(error) < math.inf or (isinstance(value, int | float) and not math.isfinite(value)):
         if isinstance(value, tuple) and any(0 < largest(e) < math.inf for e in error):
-            return format_tuple([with_error(v, e) for v, e in zip(value, error, strict=True)])
+            return _together(value, [with_error(v, e) for v, e in zip(value, error, strict=True)])
         return format_numbers(value, error)
     return " ± ".join(format_bars(value, error))
 

@@ -16,6 +16,7 @@ from msgspec.structs import replace
 from potto.core.terms import App, Deriv, Global, If, Lam, Term, Var
 from potto.kernels.cells import Cell, Rows, Value
 from potto.runtime.answers.estimate import Estimate
+from potto.runtime.answers.named import Named, has_records, named
 from potto.runtime.answers.printing import (
     MOST_ITEMS,
     format_bounds,
@@ -27,6 +28,7 @@ from potto.runtime.answers.printing import (
 )
 from potto.runtime.evaluation.functions import Derivative
 from potto.runtime.evaluation.machine import Linker
+from potto.types.types import TupleOf, Type
 
 NOTHING: Mapping[str, Value] = MappingProxyType({})
 
@@ -36,7 +38,8 @@ def format_value(value: Value) -> str:
     if isinstance(value, Cell):
         return format_numbers(value.v, 0.0 if value.e is None else value.e)
     if isinstance(value, tuple):
-        return format_tuple([format_value(item) for item in value])
+        parts = [format_value(item) for item in value]
+        return value.written(parts) if isinstance(value, Named) else format_tuple(parts)
     if isinstance(value, list | Rows):
         size = len(value) if isinstance(value, list) else value.size
         first = [value[i] if isinstance(value, list) else value.at(i) for i in range(min(size, MOST_ITEMS))]
@@ -83,6 +86,16 @@ def pair(estimate: Estimate) -> tuple[Any, Any]:
 def format_estimate(estimate: Estimate) -> str:
     """The digits of an answer that hold, a dual as `(value, tangent)`: as a program may write them."""
     return estimate.text if estimate.text is not None else format_numbers(*pair(estimate))
+
+
+def named_answer(estimate: Estimate, type: Type) -> Estimate:
+    """An answer of a type, with what is a record in it by its names; a dual is one of a pair."""
+    if not has_records(type):
+        return estimate
+    value = tangent = type
+    if estimate.tangent is not None and isinstance(type, TupleOf) and type.dual:
+        value, tangent = type.items
+    return replace(estimate, value=named(estimate.value, value), tangent=named(estimate.tangent, tangent))
 
 
 # For machines
@@ -151,9 +164,16 @@ def gives_dual(term: Term, linker: Linker, env: Mapping[str, Value] = NOTHING) -
     return False
 
 
+def _has_functions(value: Any) -> bool:
+    return value is None or (isinstance(value, tuple | list) and any(map(_has_functions, value)))
+
+
 def as_dual(estimate: Estimate) -> Estimate:
-    """The estimate of a pair `(value, tangent)` with the tangent in its own place."""
+    """The estimate of a pair `(value, tangent)` with the tangent in its own place; duals side by side, as there are
+    where one is a function, stay as they are."""
     if not (isinstance(estimate.value, tuple) and len(estimate.value) == 2) or estimate.tangent is not None:
+        return estimate
+    if _has_functions(estimate.value):
         return estimate
     (value, tangent), (error, tangent_error) = estimate.value, estimate.error
     return replace(estimate, value=value, error=error, tangent=tangent, tangent_error=tangent_error)

@@ -99,13 +99,15 @@ def _unit(t: Cell) -> float | None:
 
 
 def split(value: Value) -> Value:
-    """A value that carries a tangent as a dual: (value, tangent), componentwise two tuples."""
+    """A value that carries a tangent as a dual: (value, tangent); of a tuple two tuples, as `merge` takes them."""
     if isinstance(value, Cell):
         t = value.t[0] if value.t else None
         et = value.et[0] if value.et else None
         return (Cell(value.v, value.e), Cell(0.0 if t is None else t, et))
     if isinstance(value, tuple):
         pairs = [split(item) for item in value]
+        if holds_functions(value):  # each item is a dual of its own
+            return tuple(pairs)
         return (tuple(p[0] for p in pairs), tuple(p[1] for p in pairs))  # type: ignore[index]
     if isinstance(value, Rows):
         values, tangents = split(value.item)  # type: ignore[misc]
