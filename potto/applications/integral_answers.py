@@ -54,6 +54,8 @@ class Answers:
                     return {"names": names, "chosen": self.name or (names[0] if names else "")}
                 case "/open":
                     return self._open(str(asked["name"]))
+                case "/formulas":
+                    return {"formulas": self._formulas(str(asked["name"]))}
                 case "/look":
                     return self._look(asked)
         except PottoError as error:
@@ -70,12 +72,11 @@ class Answers:
         return self._scenes[name]
 
     def _open(self, name: str) -> dict[str, Any]:
-        """What there is to choose, the formulas, and the text with its conditions."""
+        """What there is to choose, and the text with its conditions."""
         found = self._scene(name)
         wrt = self.wrt if self.wrt in found.values else found.moving
         count = len(found.regions(wrt))
-        return {"values": found.values, "wrt": wrt, "integrals": count, "formulas": self._formulas(name),
-                **self._text(name)}  # fmt: skip
+        return {"values": found.values, "wrt": wrt, "integrals": count, **self._text(name)}
 
     def _formulas(self, name: str) -> list[dict[str, str]]:
         found = derivative_text(self.world.db, self.file, name)

@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import textwrap
 
-from potto.calculus.explanation.explain import DerivativeText, explain_derivative
+import pytest
+
+from potto.calculus.explanation.explain import DerivativeText, describe, explain_derivative
+from potto.core.terms import Global, Term
+from potto.elaborate import core
 from potto.query import Database
 
 FILE = "<text>"
@@ -140,3 +144,24 @@ def test_each_surface_of_a_sum_has_its_own_index() -> None:
     assert boundary.startswith("sum k") and boundary.endswith(")")
     inside = boundary[boundary.index("(") :]
     assert "delta(" in inside and inside.count("(") == inside.count(")")
+
+
+def test_a_long_formula_gives_way_while_it_is_written() -> None:
+    """An edit does not wait until it is simplified."""
+
+    class Enough(Exception):
+        pass
+
+    def pause() -> None:
+        raise Enough
+
+    db = Database()
+    db.set_input(("overlay", FILE), "def f(c) exp(c + c^2)\n")
+    term = core(db, FILE, "f").term
+
+    def resolve(target: Global) -> Term:
+        return core(db, target.module, target.name).term
+
+    assert describe(term, "f", "", resolve).tangent == "exp(c + c^2)*(2*c + 1)*dc"
+    with pytest.raises(Enough):
+        describe(term, "f", "", resolve, pause=pause)

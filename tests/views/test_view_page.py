@@ -110,7 +110,7 @@ def test_ghosts_are_a_step_away_and_nodes_are_where_it_was_evaluated(address: st
 
 
 def test_formulas_come_as_mathml(address: str) -> None:
-    found = asked(address, "/open", {"name": "f"})
+    found = asked(address, "/formulas", {"name": "f"})
     assert [each["part"] for each in found["formulas"]] == ["integral", "interior", "boundary"]
     assert all(each["math"].startswith("<math") for each in found["formulas"])
 

@@ -167,10 +167,12 @@ async function open(name, keep = false, which = 0) {
   fill($("which"), Array.from({ length: found.integrals }, (_, n) => [n, `integral ${n + 1} of ${found.integrals}`]), state.which);
   $("which").hidden = found.integrals < 2;
   if (!same) sliders();
-  formulas(found.formulas);
+  if (!same) formulas([]);
   source(found);
   moves();
   await look();
+  const said = await ask("/formulas", { name });  // these may take longer than the picture
+  if (opening === begun) formulas(said.formulas ?? []);
 }
 
 function sliders() {

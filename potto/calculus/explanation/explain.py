@@ -7,7 +7,7 @@ what moves each. Functions that are parameters stay symbols (`symbols`).
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 from msgspec.structs import replace
 
@@ -23,7 +23,7 @@ from potto.calculus.explanation.continuity import continuous
 from potto.calculus.explanation.fields import named_fields, parameter_types
 from potto.calculus.explanation.layout import DerivativeText, IntegralText, SurfaceText
 from potto.calculus.explanation.plain_names import plainly_named
-from potto.calculus.explanation.readable import in_decimals, readable
+from potto.calculus.explanation.readable import Progress, in_decimals, readable
 from potto.calculus.explanation.symbols import NoFormula, Rewrite, Words, over_functions
 from potto.calculus.inlining.expand import Resolve, heads_of
 from potto.calculus.solving.pivots import NoClosedForm, pivots
@@ -74,11 +74,17 @@ def explain_derivative(db: Database, file: str, name: str) -> DerivativeText:
         type = derivative_type(interface(db, of.module, of.name).type) if isinstance(of, Global) else found.type
         known = interface(db, of.module, of.name).type if isinstance(of, Global) else None
         text = describe(
-            resolve(of) if isinstance(of, Global) else of, shown, format_type(type), resolve, _fields(db, known)
+            resolve(of) if isinstance(of, Global) else of,
+            shown,
+            format_type(type),
+            resolve,
+            _fields(db, known),
+            db.give_way,
         )
         return replace(text, by=name)
     given = _applied(term, found.type)
-    return describe(given, name, format_type(derivative_type(found.type)), resolve, _fields(db, found.type))
+    type_text = format_type(derivative_type(found.type))
+    return describe(given, name, type_text, resolve, _fields(db, found.type), db.give_way)
 
 
 def _fields(db: Database, type: Type | None) -> Rewrite:
@@ -119,9 +125,10 @@ def _applied(term: Term, type: Type) -> Term:
 
 
 def describe(
-    term: Term, name: str, type_text: str, resolve: Resolve, fields: Rewrite = lambda term: term
-) -> DerivativeText:
-    """The same for a term; `fields` names those of records."""
+    term: Term, name: str, type_text: str, resolve: Resolve, fields: Rewrite = lambda term: term,
+    pause: Callable[[], None] = lambda: None,
+) -> DerivativeText:  # fmt: skip
+    """The same for a term; `fields` names those of records, `pause` may raise what ends it."""
     body, params = term, list[str]()
     while isinstance(body, Lam):
         params.extend(body.params)
@@ -132,6 +139,7 @@ def describe(
         fields,
         frozenset(params) | {f"d{p}" for p in params},
         frozenset(f"d{p}" for p in params),
+        Progress(pause),
     )
     tangents: dict[str, Term] = {p: var(f"d{p}") for p in params}
     work = Differentiator(resolve, folding=True)

@@ -7,9 +7,11 @@ tangents, in which it is linear, and a product in the order of a textbook: numbe
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from fractions import Fraction
 from math import gcd, isfinite, lcm, prod, ulp
+
+from msgspec import Struct
 
 from potto.calculus.algebra.ranges import range_of
 from potto.calculus.algebra.rational_form import Rational, normal
@@ -52,12 +54,20 @@ _TANGENT = 4  # how much longer a formula seems for each tangent that it names
 _SUM = "sum'"  # the name of a sum while it is not taken apart: one that nobody can write
 
 
-def readable(term: Term, tangents: frozenset[str], box: Box | None = None) -> Term:
+class Progress(Struct):
+    """Of formulas that are written one after the other. known: what was found for a part of one, by all that this
+    depends on; pause: called before each new part, may raise what ends it."""
+
+    pause: Callable[[], None] = lambda: None
+    known: dict[tuple[Term, frozenset[str], frozenset[str]], Term] = {}
+
+
+def readable(term: Term, tangents: frozenset[str], box: Box | None = None, progress: Progress | None = None) -> Term:
     """The same value, written to be read; `tangents`: the names by which it is linear, `box`: the ranges of its
     variables."""
     if len(format_term(term)) > _LONG:
         return term
-    work = _Work(tangents, _bound(term) | frozenset(box or ()))
+    work = _Work(tangents, _bound(term) | frozenset(box or ()), progress or Progress())
     return _decided(transform(term, lambda _, new: work.node(new)), box or {}, work)
 
 
@@ -94,29 +104,44 @@ def _bound(term: Term) -> frozenset[str]:
 
 def _decided(term: Term, box: Box, work: _Work) -> Term:
     """Without the brackets that are the same everywhere in the domain of the integral that they stand in."""
-    if isinstance(term, Integral):
-        inner = {**box, **box_of(term)}
-        parts = children(term)
-        return rebuild(term, tuple(_decided(part, inner if part is term.body else box, work) for part in parts))
-    new = rebuild(term, tuple(_decided(part, box, work) for part in children(term))) if children(term) else term
+    known: dict[Term, Term] = {}
+    for node in postorder(term, below=lambda n: () if isinstance(n, Integral) else children(n)):
+        known[node] = _inside(node, box, work) if isinstance(node, Integral) else _undecided(node, known, box, work)
+    return known[term]
+
+
+def _inside(node: Integral, box: Box, work: _Work) -> Term:
+    inner = {**box, **box_of(node)}
+    parts = children(node)
+    return rebuild(node, tuple(_decided(part, inner if part is node.body else box, work) for part in parts))
+
+
+def _undecided(node: Term, known: Mapping[Term, Term], box: Box, work: _Work) -> Term:
+    parts = children(node)
+    new = rebuild(node, tuple(known[part] for part in parts)) if parts else node
     if isinstance(new, Branch):
         bounds = range_of(new.surface, box)
         if bounds.positive or (not new.strict and bounds.lo >= 0):
             return new.then
         if bounds.negative or (new.strict and bounds.hi <= 0):
             return new.orelse
-    return new if new is term else work.node(new)
+    return new if new is node else work.node(new)
 
 
 class _Work:
-    def __init__(self, tangents: frozenset[str], inside: frozenset[str]) -> None:
+    def __init__(self, tangents: frozenset[str], inside: frozenset[str], progress: Progress) -> None:
+        self.progress = progress
         self.tangents = tangents
         self.inside = inside  # variables of integration, on which no `sign` may depend
 
     def node(self, node: Term) -> Term:
         match node:
             case Prim(op=op) if op in _ARITHMETIC:
-                return self._shortest(node)
+                key = node, self.tangents, self.inside
+                if key not in self.progress.known:
+                    self.progress.pause()
+                    self.progress.known[key] = self._shortest(node)
+                return self.progress.known[key]
             case Branch():
                 known = conditions(node)
                 if known is not None:

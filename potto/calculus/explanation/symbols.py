@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 from msgspec import Struct
 
 from potto.calculus.algebra.radicals import NAN
-from potto.calculus.explanation.readable import Box, in_decimals, readable
+from potto.calculus.explanation.readable import Box, Progress, in_decimals, readable
 from potto.calculus.surfaces.trace import spine
 from potto.core.printer import format_term
 from potto.core.simplify import simplify
@@ -59,6 +59,7 @@ class Words(Struct, frozen=True):
     fields: Rewrite
     names: frozenset[str]
     tangents: frozenset[str]
+    progress: Progress
 
     def plain(self, term: Term) -> str:
         """A term as it is written, parts of records by their names."""
@@ -72,7 +73,7 @@ class Words(Struct, frozen=True):
         strangers = {name for name in plain.free - known if name.rstrip("'") != "delta"}  # `delta'`: its derivative
         if strangers:
             raise NoFormula(f"where it jumps depends on `{min(strangers)}`, over which it is summed")
-        text = format_term(readable(simplify(self.fields(plain)), self.tangents, box))
+        text = format_term(readable(simplify(self.fields(plain)), self.tangents, box, self.progress))
         if "..." in text:
             raise NoFormula("the formula is too long to be shown")
         return text
