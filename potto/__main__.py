@@ -22,10 +22,24 @@ def main(argv: Sequence[str] | None = None) -> int:
         return FINE
     _open_streams()
     try:
-        return _guarded(arguments)
+        status = _guarded(arguments)
     except KeyboardInterrupt:
         sys.stderr.write("\ninterrupted\n")
-        return INTERRUPTED
+        status = INTERRUPTED
+    if status == INTERRUPTED and argv is None:
+        _leave()
+    return status
+
+
+def _leave() -> None:
+    """End the process now. A thread of LLVM, which cannot be interrupted, would be waited for, for seconds."""
+    import os
+    from contextlib import suppress
+
+    with suppress(OSError, ValueError):
+        sys.stdout.flush()
+        sys.stderr.flush()
+    os._exit(INTERRUPTED)
 
 
 def _guarded(arguments: list[str]) -> int:

@@ -45,6 +45,14 @@ class Workers(Executor):
             self._pool = ProcessPoolExecutor(self._max_workers, context, _leave_interrupts)
         return self._pool
 
+    def __exit__(self, *raised: object) -> None:
+        """What is still worked on nobody waits for: who asked has been interrupted."""
+        pool, self._pool = self._pool, None
+        if pool is not None:
+            for process in list((getattr(pool, "_processes", None) or {}).values()):
+                process.terminate()
+            pool.shutdown(cancel_futures=True)
+
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
         pool, self._pool = self._pool, None
         if pool is not None:

@@ -9,6 +9,7 @@ import pickle
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import contextmanager
@@ -190,6 +191,14 @@ def test_an_interrupt_keeps_what_is_done(module: Any, monkeypatch: pytest.Monkey
     assert (found.value[:640] == whole.value[:640]).all() and np.isnan(found.value[640:]).all()
     assert found.member_converged[:640].all() and not found.member_converged[640:].any() and not found.converged
     assert found.reasons_of(700) == (INTERRUPTED.message,)
+
+
+def test_workers_are_not_waited_for_after_an_interrupt() -> None:
+    start = time.perf_counter()
+    with pytest.raises(KeyboardInterrupt), Workers(1) as pool:
+        pool.submit(time.sleep, 100)
+        raise KeyboardInterrupt
+    assert time.perf_counter() - start < 50
 
 
 def test_progress_is_told(module: Any) -> None:

@@ -110,6 +110,26 @@ def test_who_does_not_is_ended(words: list[str]) -> None:
     assert process.returncode in (130, -signal.SIGINT) and out == ""  # the second before the command has taken over
 
 
+BUSY = """
+import sys, time, concurrent.futures as futures, potto.__main__ as m, potto.cli.command_line as line
+pool = futures.ThreadPoolExecutor(1)
+
+def dispatch(arguments):
+    pool.submit(time.sleep, 100)
+    print("what was done")
+    raise KeyboardInterrupt
+
+line.dispatch = dispatch
+sys.exit(m.main())
+"""
+
+
+def test_an_interrupt_does_not_wait_for_what_is_made_meanwhile() -> None:
+    """As Python does for its threads, and LLVM takes seconds."""
+    found = subprocess.run([sys.executable, "-c", BUSY], capture_output=True, text=True, timeout=60)
+    assert (found.returncode, found.stdout, found.stderr) == (130, "what was done\n", "\ninterrupted\n")
+
+
 def test_an_interrupt_while_a_class_is_made_is_one(monkeypatch: pytest.MonkeyPatch, capsys) -> None:
     """Python 3.11 tells it as a RuntimeError."""
 
