@@ -59,10 +59,11 @@ class TwoSided(Event, frozen=True):
 
 class Along(Event, frozen=True):
     """A surface is 0 all along a stretch of a variable, and moves there: a little beside the parameters all of the
-    stretch is on one of its sides, or it has sections there."""
+    stretch is on one of its sides, or it has sections there. bound: it is so all along a bound of the variable."""
 
     variable: str
     surface: Term
+    bound: bool = False
 
 
 class Fold(Event, frozen=True):

@@ -28,6 +28,8 @@ FOLDS = [  # what is integrated, where, backward, forward
     ("integral [0, 1] [(x - 1/2)^2 < t]*exp(x) d(x)", 0.0, 0.0, INF),
     ("integral [-1, 1] [x^2 < t^2] d(x)", 0.0, -2.0, 2.0),  # 2 |t|
     ("integral [-1, 1] [abs(x) < t] d(x)", 0.0, 0.0, 2.0),
+    ("integral [-1, 1] [x^2 + t*x < t^2] d(x)", 0.0, -math.sqrt(5), math.sqrt(5)),  # roots t*(-1 +- sqrt(5))/2
+    ("integral [-1, 1] [x <= t and x^2 + t*x <= t^2] d(x)", 0.0, 0.0, math.sqrt(5)),
     ("integral [-1, 1] [x^4 < t] d(x)", 0.0, 0.0, INF),
     ("integral [-1, 1] [x^3 < t] d(x)", 0.0, INF, INF),
     ("integral [0, 3] [sin(x) > t] d(x)", 1.0, -INF, 0.0),  # pi - 2 asin(t)
@@ -183,3 +185,10 @@ def test_what_is_made_of_integrals_has_the_two_sides_of_the_whole(body: str, bac
 def test_what_leaves_one_integral_and_comes_into_another() -> None:
     answer = rate("(integral [0, 1] [x < t] d(x)) + (integral [-1, 0] [x < t] d(x))")
     assert not answer.notes and abs(answer.tangent - 1) <= answer.tangent_error < 1e-12
+
+
+@pytest.mark.parametrize("method", ["mc", "qmc"])
+def test_samples_tell_surfaces_on_bounds(method: Any) -> None:
+    with potto.settings(method=method, samples=1024):
+        (note,) = rate("integral ([0, 1], [0, 1]) [x < t]*y d(x, y)", 1.0).notes
+    assert (note.backward, note.forward) == pytest.approx((0.5, 0.0), abs=1e-9) and "lies on a bound" in str(note)

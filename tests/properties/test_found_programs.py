@@ -221,3 +221,24 @@ def f(t, s) integral ([s, 1], y ~ exponential(2), [-1, 1]) max(y, s)*[exp(y*t) -
     with potto.settings(rtol=1e-4, max_evals=200_000):
         answer = potto.grad(f, ["t", "s"])(1.0, s)
     assert abs(answer.value - (1 - s) * (2 * s + math.exp(-2 * s))) <= answer.error
+
+
+def test_what_says_that_a_measure_is_none_is_not_evaluated_where_it_is_one() -> None:
+    """It was refused. With a chance p(x) = 1/(x^2 + 5/4) of 1: 1 + (e - 1)p, and half of it above 0.3."""
+    f = potto.compile("""def f(t) integral [-0.5, 1.5]
+        (integral (y ~ bernoulli(1/(x^2 + 1.25))) exp(y)/(1 + [x + 0.25*[x >= t] >= 0.3]) d(y)) d(x)""").f
+
+    def sums(a: float, b: float) -> float:
+        r = math.sqrt(1.25)
+        return b - a + (math.e - 1) * (math.atan(b / r) - math.atan(a / r)) / r
+
+    answer = f(0.4)
+    assert abs(answer.value - (sums(-0.5, 0.3) + sums(0.3, 1.5) / 2)) <= answer.error < 1e-9
+
+
+def test_members_with_several_plans_all_of_which_are_0() -> None:
+    """How many numbers the integrand is was asked of one plan for all: it crashed. Below s = -1 nothing is inside."""
+    f = potto.compile("""def f(t, s)
+        integral [0, cosh(1) + sinh(sin(s))] [x + 1.83*[max(x, 0.7*s) < s] <= s]*[max(x, 0.7*t) - t < 0.2] d(x)""").f
+    answer = potto.deriv(f)((np.array([0.375, -1.0, -1.0]), np.ones(3)), (np.array([-1.0, -1.0, -0.8]), np.ones(3)))
+    assert not answer.value.any() and not answer.tangent.any()

@@ -15,6 +15,7 @@ from fractions import Fraction
 from potto.calculus.algebra.fractions import numerator
 from potto.calculus.algebra.polynomial_in import Collected, collect, dominators
 from potto.calculus.algebra.radicals import TWO, minus, quotient, signed, square_root
+from potto.calculus.algebra.ranges import range_of
 from potto.calculus.algebra.rational_form import is_zero, shorter
 from potto.calculus.solving.isolate import Guard, Step, Steps, Stuck
 from potto.core.terms import (
@@ -26,6 +27,7 @@ from potto.core.terms import (
     Term,
     Var,
     add,
+    branch,
     const,
     div,
     fresh,
@@ -175,7 +177,10 @@ def quadratic(a: Term, b: Term, c: Term) -> tuple[Term, Term]:
         disc = shorter(sub(pow_(half, TWO), mul(a, c)))
         root = square_root(disc)
         q = signed(half, neg(add(half, root)), sub(root, half))
-    return quotient(q, a), quotient(c, q)
+    one, other = quotient(q, a), quotient(c, q)
+    if any(bounds.positive or bounds.negative for bounds in map(range_of, (b, c))):
+        return one, other
+    return one, branch((neg(prim("abs", q)),), False, one, other)  # where q is 0 both are
 
 
 def halved(term: Term) -> Term | None:

@@ -17,6 +17,7 @@ from potto.core.terms import (
     Branch,
     Deriv,
     Fold,
+    Hole,
     If,
     Index,
     Integral,
@@ -86,10 +87,10 @@ HEAVY = (Integral, Sum, Fold, Array, Index)
 def is_heavy(term: Term, calls: bool) -> bool:
     """Whether a side of a conditional is worth evaluating only where it is taken.
 
-    Integrals, sums and what reads arrays are; calls are too (`calls`) under a plain condition, which may be what ends
-    a recursion.
+    Integrals, sums and what reads arrays are; calls and holes are too (`calls`) under a plain condition, which may be
+    what ends a recursion, or says that a measure is none.
     """
-    return any(isinstance(t, HEAVY) or (calls and isinstance(t, App)) for t in postorder(term))
+    return any(isinstance(t, HEAVY) or (calls and isinstance(t, App | Hole)) for t in postorder(term))
 
 
 def is_lazy(term: If | Branch) -> bool:

@@ -22,7 +22,7 @@ from potto.integrate.decomposition.meetings import SEARCHED, Row, as_array
 from potto.integrate.decomposition.root_isolation import at_label, between, isolated
 from potto.integrate.events import ROOTS_NOT_SEPARATED, TOO_MANY_ROOTS, Unsearched
 from potto.integrate.levels import LevelPlan
-from potto.integrate.pieces import still
+from potto.integrate.pieces import gather, still
 from potto.integrate.rules.gauss import EPS
 from potto.kernels.cells import Array, Bools, Cell, Ints, Value, pad
 
@@ -197,28 +197,35 @@ class _Along(Struct, frozen=True, dict=True):
         if not a.shape[0]:
             return a, a
         env, one = {n: pad(v, 1) for n, v in self.still.items()}, self.machine.with_directions(1)
+        shape, owner = a.shape, np.broadcast_to(np.arange(a.shape[-1]), a.shape).ravel()
 
-        def psi(x: Array) -> tuple[Array, Array]:
-            value = _call(self.function, {**env, self.variable: Cell(x, None, (1.0,))}, one)
+        def psi(x: Array, of: Ints) -> tuple[Array, Array]:
+            here = {**gather(env, of), self.variable: Cell(x, None, (1.0,))}
+            value = _call(self.function, here, one)
             slope = 0.0 if value.t[0] is None else value.t[0]
             return np.broadcast_to(value.v, x.shape), np.broadcast_to(slope, x.shape)
 
         with np.errstate(all="ignore"):
-            left = np.sign(psi(a)[0])
-            right = np.sign(psi(b)[0])
+            a, b = a.ravel().copy(), b.ravel().copy()
+            left = np.sign(psi(a, owner)[0])
+            right = np.sign(psi(b, owner)[0])
             left = np.where((left == 0) | np.isnan(left), -right, left)
-            x = between(a, b)
+            x, going = between(a, b), np.arange(a.size)
             for turn in range(BISECTIONS):
-                f, slope = psi(x)
-                below = left * f > 0
-                a, b = np.where(below, x, a), np.where(below, b, x)
-                step = x - f / slope
-                good = (step > a) & (step < b) & (turn % 3 < 2)
-                new = np.where(f == 0, x, np.where(good, step, between(a, b)))
-                rests = (np.abs(new - x) <= EPS * np.abs(x)) | np.isnan(x) | (np.abs(b - a) <= EPS * np.abs(x))
-                x = new
-                if rests.all():
+                at, low, high = x[going], a[going], b[going]
+                f, slope = psi(at, owner[going])
+                below = left[going] * f > 0
+                low, high = np.where(below, at, low), np.where(below, high, at)
+                step = at - f / slope
+                good = (step > low) & (step < high) & (turn % 3 < 2)
+                new = np.where(f == 0, at, np.where(good, step, between(low, high)))
+                small = EPS * np.abs(at)
+                rests = (np.abs(new - at) <= small) | np.isnan(at) | (np.abs(high - low) <= small)
+                x[going], a[going], b[going] = new, low, high
+                going = going[~rests]
+                if not going.size:
                     break
+            x, a, b = (part.reshape(shape) for part in (x, a, b))
         return x, b - a
 
     def with_slopes(self, x: Array, tracking: bool = False) -> Cell:

@@ -1,13 +1,14 @@
 """Kinks and surfaces that lie all along a stretch of the domain: |x*t|, or [x*t <= 0], at t = 0, max(x + t*y, x).
 
-Owns `lying_along` and `note_flat`. There is no place to cut at. Where such a kink moves, the integrand has two
-derivatives throughout the stretch; where such a surface does, the stretch is on one of its sides, or is cut, at once.
+Owns `lying_along`, `on_bounds` and `note_flat`. There is no place to cut at. Where such a kink moves, the integrand has
+two derivatives throughout the stretch; where such a surface does, the stretch is on one of its sides, or cut, at once.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+from potto.core.terms import Term, function_of
 from potto.integrate.degenerate.coincidences import CLEAR, Scene
 from potto.integrate.degenerate.undefined import LOOKED_AT
 from potto.integrate.events import Along
@@ -26,24 +27,64 @@ STEPS = 1.2207440846057596 ** -np.arange(1.0, 9.0)
 def lying_along(plan: Plan, env: dict[str, Value], batch: int, machine: Evaluator) -> list[tuple[int, Ints]]:
     """The numbers of the kinks of a plan that are 0 at places of the domain which no program would choose, and move
     there; with the members for which they do."""
-    count = PLACES if batch <= MANY else FEW_PLACES
-    owner = np.repeat(np.arange(batch), count)
-    here = gather({name: pad(value, machine.directions) for name, value in env.items()}, owner) if batch > 1 else env
-    quiet = machine.apart().tracking()
-    for number, level in enumerate(plan.levels):
-        ends = components(quiet.evaluate(level.bounds, {n: still(here[n]) for n in level.bounds.params}, None))
-        lo, hi = (np.broadcast_to(end.v, owner.shape) for end in ends)
-        part = (0.5 + np.arange(1, count + 1) * STEPS[number % STEPS.size]) % 1.0
-        x = _between(lo, hi, np.tile(part, batch))
-        here = {**here, level.variable: Cell(x, None, (None,) * machine.directions)}
+    owner, quiet = _owners(batch), machine.apart().tracking()
+    here = _places(plan, env, owner, batch, quiet)
     found = quiet.evaluate(plan.kinks, {n: here[n] for n in plan.kinks.params}, None)
     met = []
     for number, kink in enumerate(components(found)):
-        there = (np.abs(kink.v) <= CLEAR * (0.0 if kink.e is None else kink.e)) & _moves(kink, owner.size)
-        members = np.unique(owner[np.broadcast_to(there, owner.shape)])
+        members = _resting_at_0(kink, owner)
         if members.size:
             met.append((number, members))
     return met
+
+
+def on_bounds(plan: Plan, env: dict[str, Value], batch: int, machine: Evaluator) -> list[tuple[Along, Ints]]:
+    """The surfaces that lie all along a bound of a variable, and move there otherwise than it does; with the members
+    for which they do."""
+    owner, quiet = _owners(batch), machine.apart().tracking()
+    jumps = [group.cut.surface for group in plan.groups]
+    met: dict[tuple[str, Term], Bools] = {}
+    for number, level in enumerate(plan.levels):
+        along = [surface for surface in jumps if level.variable in surface.free]
+        for upper in (False, True) if along else ():
+            here = _places(plan, env, owner, batch, quiet, (number, upper))
+            for surface in along:
+                value = quiet.evaluate(function_of(surface), {n: here[n] for n in surface.free}, None)
+                members = _resting_at_0(value, owner) if isinstance(value, Cell) else owner[:0]
+                there = met.setdefault((level.variable, surface), np.zeros(batch, dtype=bool))
+                there[members] = True
+    return [(Along(*where, bound=True), np.nonzero(there)[0]) for where, there in met.items() if there.any()]
+
+
+def _owners(batch: int) -> Ints:
+    """Whose places are looked at: several of each member."""
+    return np.repeat(np.arange(batch), PLACES if batch <= MANY else FEW_PLACES)
+
+
+def _places(
+    plan: Plan, env: dict[str, Value], owner: Ints, batch: int, machine: Evaluator, at: tuple[int, bool] | None = None
+) -> dict[str, Value]:
+    """Places of the domain which no program would choose; or at the lower or upper bound of a variable, by its number,
+    and so moving with it."""
+    here = gather({name: pad(value, machine.directions) for name, value in env.items()}, owner) if batch > 1 else env
+    for number, level in enumerate(plan.levels):
+        if at is not None and number == at[0]:
+            ends = components(machine.evaluate(level.bounds, {n: here[n] for n in level.bounds.params}, None))
+            here = {**here, level.variable: pad(ends[at[1]], machine.directions)}
+            continue
+        resting = {n: still(here[n]) for n in level.bounds.params}
+        ends = components(machine.evaluate(level.bounds, resting, None))
+        lo, hi = (np.broadcast_to(end.v, owner.shape) for end in ends)
+        part = (0.5 + np.arange(1, owner.size // batch + 1) * STEPS[number % STEPS.size]) % 1.0
+        x = _between(lo, hi, np.tile(part, batch))
+        here = {**here, level.variable: Cell(x, None, (None,) * machine.directions)}
+    return here
+
+
+def _resting_at_0(value: Cell, owner: Ints) -> Ints:
+    """The members at one of whose places a number is 0 to rounding, and moves."""
+    there = (np.abs(value.v) <= CLEAR * (0.0 if value.e is None else value.e)) & _moves(value, owner.size)
+    return np.unique(owner[np.broadcast_to(there, owner.shape)])
 
 
 def note_flat(scene: Scene, seg: Segments, flat: dict[int, Bools]) -> None:

@@ -44,7 +44,7 @@ def _surfaces(problem: Problem) -> list[tuple[TwoSided, Ints]]:
         mask = np.zeros(problem.batch, dtype=bool)
         mask[slice(None) if members is None else members] = True
         if (fresh := np.nonzero(mask & ~met)[0]).size:
-            found.append((TwoSided(event.variable, event.surface, along=True), fresh))
+            found.append((TwoSided(event.variable, event.surface, along=not event.bound), fresh))
         met |= mask
     problem.events.forget(Along)
     return found

@@ -135,7 +135,8 @@ def _integrate(machine: Machine, term: Integral, env: dict[str, Value], outermos
     problem = Problem(machine.apart(), term, *linked(flat), solve, batch, outermost)
     sums = poisoned(_grouped(problem, flat), problem.env)
     if sums.v.shape[0] == 1 and not sums.v.any():  # where nothing is integrated it is not known how many numbers it is
-        sums = sums.widened(problem.plan().width)
+        alone = problem if problem.batch == 1 else problem.member(0)  # one plan need not be for all of them
+        sums = sums.widened(alone.plan().width)
     if not outermost:
         for event, _ in problem.events:
             machine.note(event.outside())

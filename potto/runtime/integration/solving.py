@@ -14,6 +14,7 @@ from msgspec.structs import replace
 
 from potto.calculus.differentiation.level_sets import placed_along
 from potto.core.terms import Integral
+from potto.integrate.degenerate.kinks import on_bounds
 from potto.integrate.events import (
     ALONG_AXES,
     TOO_MANY_CASES,
@@ -73,6 +74,9 @@ def by_samples(problem: Problem) -> Sums | None:
     sums = counted(problem, plan, sample(plan, problem.machine, problem.env, problem.batch, method), drawn=True)
     problem.machine.record.methods.add("mc" if method == "mc" else "qmc")
     sums.et[:, :, _blind(problem)] = np.inf  # what crosses those that were left out is not known
+    if problem.machine.directions and not problem.machine.frozen:
+        for event, members in on_bounds(plan, problem.env, problem.batch, problem.machine):
+            problem.machine.note(event, members)
     return sums
 
 
