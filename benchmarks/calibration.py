@@ -126,6 +126,19 @@ def native() -> None:
     start = time.perf_counter()
     objects.compiler()
     print(f"native: LLVM loaded in {time.perf_counter() - start:.3f} s")
+    with potto.settings(backend="native"):  # the first function costs more than others
+        potto.compile("def f(a) a*a + 1").f(np.linspace(0, 1, 4_000))
+    sizes, spans, made_of = [], [], objects.made
+
+    def timed(text: str, name: str) -> tuple[objects.Loaded, bool]:
+        start = time.perf_counter()
+        found = made_of(text, name)
+        if found[1]:
+            sizes.append(text.count("\n"))
+            spans.append(time.perf_counter() - start)
+        return found
+
+    objects.made = timed
     programs = {
         "1-D, a root": "def f(a) integral [0, 3] exp(-x)*[x*x < a] d(x)",
         "2-D, a line": "def f(a) integral ([0, 1], [0, 1]) 1/(x + y + a)^2*[x + y < a] d(x, y)",
@@ -145,6 +158,11 @@ def native() -> None:
         made, spent = counts.native - made, counts.native_seconds - spent
         print(f"  {name:16} {made} functions, {spent / max(made, 1) * 1e3:5.1f} ms each; "
               f"a member {times[0] * 1e6:.1f} us by numpy, {times[1] * 1e6:.1f} us by machine code")  # fmt: skip
+    objects.made = made_of
+    line, least = np.polyfit(sizes, spans, 1, w=1 / np.array(spans))
+    off = np.abs(np.array(spans) / (least + line * np.array(sizes)) - 1)
+    print(f"  of {len(sizes)} texts of {min(sizes)} to {max(sizes)} lines: {least * 1e3:.1f} ms and "
+          f"{line * 1e6:.0f} us a line, within {off.max():.0%}, half of them within {np.median(off):.0%}")  # fmt: skip
 
 
 def elementary() -> None:

@@ -97,11 +97,14 @@ def totals(estimates: Sequence[Estimate]) -> dict[str, Any]:
 
 def show_stats(estimates: Sequence[Estimate], console: Console) -> None:
     """What evaluations cost, all together, for the person."""
+    from potto.runtime.answers.printing import computed_by
+
     seconds = sum(estimate.seconds for estimate in estimates)
     compiling = sum(estimate.compile_seconds for estimate in estimates)
     console.complain(f"time: {seconds * 1e3:.2f} ms, {compiling * 1e3:.2f} ms of it for plans and kernels, made once")
     found = totals(estimates)
     surfaces = found.pop("surfaces")
+    console.complain(f"computed {computed_by(found)}")
     for name, total in found.items():
         console.complain(f"{name}: {total:,}")
     kept = sum(entry["kept"] for entry in surfaces)

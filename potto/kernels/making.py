@@ -1,7 +1,7 @@
 """What is made once and used again, and the time that takes: kernels, plans, proofs.
 
-Owns `making`, and `counts` of kernels and of functions of machine code (which another thread makes). What is made on
-the way to something else counts once.
+Owns `making`, and `counts` of definitions linked, of kernels and of functions of machine code (which another thread
+makes). What is made on the way to something else counts once.
 """
 
 from __future__ import annotations
@@ -21,9 +21,10 @@ class Counts(Struct):
     kept: int = 0
     native_seconds: float = 0.0
     native_points: int = 0
+    linked: int = 0
 
-    def so_far(self) -> tuple[int, int, int, float, int, int, int]:
-        made = self.compiled, self.reused, self.recalled, self.seconds
+    def so_far(self) -> tuple[int, int, int, int, float, int, int, int]:
+        made = self.linked, self.compiled, self.reused, self.recalled, self.seconds
         return *made, self.native, self.kept, self.native_points
 
 

@@ -16,6 +16,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, wait
 from contextlib import nullcontext
 from functools import cache
+from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
 from msgspec import Struct, field
@@ -230,7 +231,14 @@ class _Tiles(Struct):
         """All that is done, in order."""
         some = next(iter(self.done.values()))
         blocks = self.blocks or [(0, some.member_converged.size), (some.member_converged.size, self.count)]
-        parts = [self.done[first] if first in self.done else unfinished(some, stop - first) for first, stop in blocks]
+        parts: list[Estimate] = []
+        for done, run in groupby(blocks, lambda block: block[0] in self.done):
+            together = list(run)  # what is missing is one part, however many blocks it would have been
+            parts += (
+                [self.done[first] for first, _ in together]
+                if done
+                else [unfinished(some, together[-1][1] - together[0][0])]
+            )
         found = joined(parts)
         stats = {**found.stats, "blocks": len(blocks)}
         if self.again:

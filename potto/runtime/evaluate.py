@@ -164,8 +164,9 @@ class Clock:
         return self
 
     def __exit__(self, *exc: object) -> None:
-        compiled, reused, recalled, spent, native, kept, points = self.before
+        linked, compiled, reused, recalled, spent, native, kept, points = self.before
         self.seconds = time.perf_counter() - self.start
+        self.linked = counts.linked - linked
         self.compiled, self.reused = counts.compiled - compiled, counts.reused - reused
         self.recalled = counts.recalled - recalled
         self.spent = counts.seconds - spent
@@ -215,20 +216,18 @@ def report(value: Value, machine: Machine, clock: Clock) -> Estimate:
 def stats_of(record: Record, clock: Clock) -> dict[str, Any]:
     """What an evaluation was spent on, as its estimate tells."""
     stats: dict[str, Any] = {
+        "definitions linked": clock.linked,
         "kernels compiled": clock.compiled,
         "kernels from disk": clock.recalled,
         "kernels reused": clock.reused,
+        "machine code compiled": clock.native,
+        "machine code from the cache": clock.kept,
+        "points by machine code": clock.native_points,
         "integrals": record.integrals,
         "evaluations": record.evaluations,
     }
     if record.culled:
         stats["integrals culled"] = record.culled
-    if clock.native or clock.kept or clock.native_points:
-        stats |= {
-            "machine code compiled": clock.native,
-            "machine code from the cache": clock.kept,
-            "points by machine code": clock.native_points,
-        }
     if record.costs is not None:
         stats |= record.costs.told()
     return stats

@@ -62,8 +62,8 @@ def test_numpy_goes_on_where_llvm_fails(monkeypatch: pytest.MonkeyPatch) -> None
         raise RuntimeError("LLVM knows no such processor")
 
     monkeypatch.setattr(objects, "made", failing)
-    monkeypatch.setattr(promotion, "FUNCTION", 0.0)
-    monkeypatch.setattr(promotion, "LLVM", 0.0)
+    for cost in ("LLVM", "LEAST", "LINE"):
+        monkeypatch.setattr(promotion, cost, 0.0)
     d, before = 2.03125, counts.native_points
     function = potto.compile(TEXT.replace("2)", f"{d})")).f
     with potto.settings(backend="auto"):

@@ -153,6 +153,10 @@ def test_time_has_the_phases(talk):
     data = talk.data(":time f(0.3)")
     assert list(data["seconds"]) == ["parse", "check", "compile", "link", "evaluate"]
     assert all(spent >= 0 for spent in data["seconds"].values())
+    assert data["stats"]["kernels compiled"] + data["stats"]["kernels from disk"] >= 1
+    *_, linked, kernels, computed = talk(":time f(0.3)").text.splitlines()
+    assert linked == "0 definitions linked" and kernels.startswith("0 kernels made, 0 from the cache, ")
+    assert computed.endswith(" evaluations, by numpy")
 
 
 def test_error_is_a_work_precision_table(talk):

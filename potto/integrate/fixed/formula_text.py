@@ -12,8 +12,7 @@ from msgspec import Struct
 
 from potto.core.terms import Lam
 from potto.integrate.pieces import Evaluator
-from potto.kernels.native.straight import NotStraight, Packed, Part, needed, packed
-from potto.kernels.native.straight import Straight as Lines
+from potto.kernels.native.straight import Flat, NotStraight, Packed, Part, packed
 from potto.kernels.native.vectors import LANES, Vectors
 
 ONE = "1.0"
@@ -113,14 +112,10 @@ class FormulaText:
         kernel = machine.kernel(function, tuple(arg.pattern() for arg in args))
         if not kernel.plain:
             raise NotStraight(kernel.text)
-        lines = Lines.of(kernel)
-        known = {}
-        for name, part in lines.parts.items():
-            known[name] = self.plain(args[part.path[0]].part(part)) or self.zero
-        cells = list(packed(lines.result))
-        wanted = {name for cell in cells for name in cell.parts()}
-        found = self.at.run(needed(lines.operations(), wanted), known)
-        return [self.symbol(cell, found) for cell in cells]
+        flat = Flat.of(kernel)
+        known = {name: self.plain(args[part.path[0]].part(part)) or self.zero for name, part in flat.parts.items()}
+        found = self.at.run(flat.operations, known)
+        return [self.symbol(cell, found) for cell in packed(flat.result)]
 
     def symbol(self, cell: Packed, found: Mapping[str, str]) -> Symbol:
         def part(name: str | None) -> str | None:

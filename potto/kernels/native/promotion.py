@@ -1,8 +1,8 @@
 """When machine code takes over from numpy: once numpy has taken as long as making it is expected to.
 
-Owns `Promotion`. First answers never wait: the text is written when it pays, LLVM works on it in a thread of its own,
-and numpy goes on until that is done. Who rents for as long as buying costs, and then buys,
-pays at most twice the least.
+Owns `Promotion`. First answers never wait: the text is written when the least function would pay, LLVM works on it in a
+thread of its own once this one does, as long as it is, and numpy goes on until that is done. Who rents for as long as
+buying costs, and then buys, pays at most twice the least.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ from potto.kernels.native.straight import NotStraight
 if TYPE_CHECKING:
     from concurrent.futures import Future, ThreadPoolExecutor
 
-# Seconds, as `benchmarks/calibration.py native` measures them: a function of machine code from its kernels, and once in
-# a process the loading of LLVM.
-FUNCTION, LLVM = 0.03, 0.15
+# Seconds, as `benchmarks/calibration.py native` measures them: the loading of LLVM, once in a process; a function of
+# machine code at the least, and what each line of its text adds.
+LLVM, LEAST, LINE = 0.15, 0.003, 22e-6
 
 
 class Promotion:
@@ -33,6 +33,8 @@ class Promotion:
         self.name = name
         self.spent = 0.0
         self.impossible = False
+        self._cost = LEAST
+        self._text: str | None = None
         self._ready: objects.Loaded | None = None
         self._coming: Future[objects.Loaded] | None = None
 
@@ -40,8 +42,9 @@ class Promotion:
         """The function if it is to be used now, None if numpy is. text: what to compile; may raise NotStraight."""
         if backend == "numpy" or self.impossible:
             return None
-        if self._ready is None and (backend == "native" or self._pays()):
-            self._get(text, backend == "native")
+        now = backend == "native"
+        if self._ready is None and (now or self._pays()):
+            self._get(text, now)
         return self._ready
 
     @property
@@ -57,22 +60,33 @@ class Promotion:
         self.spent += time.thread_time() - start
 
     def _pays(self) -> bool:
+        """Whether numpy has taken as long as machine code would; until its text is written, as the least would."""
         return self._coming is not None or (
-            self.spent > FUNCTION + (0.0 if objects.loaded_llvm() else LLVM) and objects.available()
+            self.spent > self._cost + (0.0 if objects.loaded_llvm() else LLVM) and objects.available()
         )
 
     def _get(self, text: Callable[[], str], now: bool) -> None:
-        coming = self._coming  # other threads may be here as well
         try:
-            if coming is None:
-                with making:
-                    written = text()
-                coming = self._coming = _worker(os.getpid()).submit(_made, written, self.name)
-            if now or coming.done():
+            coming = self._coming or self._asked(text, now)  # other threads may be here as well
+            if coming is not None and (now or coming.done()):
                 self.impossible = not now and coming.exception() is not None  # numpy goes on where LLVM can't
                 self._ready = None if self.impossible else coming.result()
         except NotStraight:
             self.impossible = True
+
+    def _asked(self, text: Callable[[], str], now: bool) -> Future[objects.Loaded] | None:
+        """The function on its way, if it pays now that its text is known."""
+        written = self._text
+        if written is None:
+            with making:
+                written = self._text = text()
+            self._cost = LEAST + LINE * written.count("\n")
+        if not (now or self._pays()):
+            return None
+        if self._coming is None:
+            self._coming = _worker(os.getpid()).submit(_made, written, self.name)
+            self._text = None
+        return self._coming
 
 
 def _made(text: str, name: str) -> objects.Loaded:

@@ -17,7 +17,7 @@ from potto.kernels.native.elementary import module
 from potto.kernels.native.objects import Loaded
 from potto.kernels.native.points import address
 from potto.kernels.native.promotion import Promotion
-from potto.kernels.native.straight import NotStraight, Packed, Part, Result, Straight, needed, packed
+from potto.kernels.native.straight import Flat, NotStraight, Packed, Part, Result, needed, packed
 from potto.kernels.native.vectors import LANES, Vectors
 from potto.kernels.written import Kernel
 
@@ -35,17 +35,16 @@ class Stepping:
 
     def text(self) -> str:
         """The function. Raises NotStraight."""
-        straight = Straight.of(self.kernel)
-        results = [cell.v for cell in packed(straight.result)]
-        operations = straight.operations()
-        if any(operation.is_mask and operation.name in results for operation in operations):
+        flat = Flat.of(self.kernel)
+        results = [cell.v for cell in packed(flat.result)]
+        if any(operation.is_mask and operation.name in results for operation in flat.operations):
             raise NotStraight("a condition as a result")
         at = Vectors()
         length, steps = at.address("%frame", 0), at.address("%frame", 1)
         out = at.address("%frame", 2, "ptr")
         last = at.whole("sub", length, LANES)
         blocks = at.whole("udiv", at.whole("add", length, LANES - 1), LANES)
-        rooms = {path: at.room(1) for path in _paths(straight.result, (self.state,))}
+        rooms = {path: at.room(1) for path in _paths(flat.result, (self.state,))}
         begin = at.whole("mul", at.begin(blocks), LANES)
         first = at.once(f"call i64 @llvm.umin.i64(i64 {begin}, i64 {last})", begin)  # the last ones are done twice
 
@@ -55,7 +54,7 @@ class Stepping:
 
         for number, room in enumerate(rooms.values()):
             at.store(column(number), room)
-        others = [(name, part) for name, part in straight.parts.items() if part.path[0] not in (self.state, self.place)]
+        others = [(name, part) for name, part in flat.parts.items() if part.path[0] not in (self.state, self.place)]
         self.columns = [part for _, part in others]
         numbered = [
             (name, len(rooms) + number, part.path[0] in self.rows) for number, (name, part) in enumerate(others)
@@ -63,13 +62,13 @@ class Stepping:
         values = {name: column(number) for name, number, many in numbered if not many}
         step = at.begin(steps)
         values |= {name: column(number, step) for name, number, many in numbered if many}
-        for name, part in straight.parts.items():
+        for name, part in flat.parts.items():
             if part.path[0] == self.state:
                 values[name] = at.load(self.room(rooms, part))
             elif part.path[0] == self.place:
                 count = at.spread(at.once(f"uitofp i64 {step} to double", step))
                 values[name] = at.apply("add", at.constant("%numbers", 0), count)
-        values = at.run(needed(operations, results), values)
+        values = at.run(needed(flat.operations, results), values)
         for number, (name, room) in enumerate(zip(results, rooms.values(), strict=True)):
             value = values[name] if name in values else at.number(float(name))
             row = at.whole("add", at.whole("mul", steps, number), step)

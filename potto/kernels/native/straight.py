@@ -1,8 +1,9 @@
 """Kernels' texts as straight lines of operations, and which of these don't depend on the point.
 
-Owns `Straight`. The text of a plain kernel (`compile.py`) is its intermediate form: arguments are taken apart, numbers
-are computed one line after the other, cells are put together. What depends only on arguments that are the same at
-every point is computed once, by the lines as they are; the rest are operations on numbers and masks.
+Owns `Flat`, all operations of a kernel, and `Straight`, for which it is told what varies. The text of a plain kernel
+(`compile.py`) is its intermediate form: arguments are taken apart, numbers are computed one line after the other, cells
+are put together. What depends only on arguments that are the same at every point is computed once, by the lines as they
+are; the rest are operations on numbers and masks.
 """
 
 from __future__ import annotations
@@ -95,18 +96,10 @@ class Straight(Struct, frozen=True):
     @classmethod
     def of(cls, kernel: Kernel) -> Straight:
         """The lines of a plain kernel. Raises NotStraight."""
-        definition = ast.parse(kernel.text).body[0]
-        assert isinstance(definition, ast.FunctionDef)
-        paths: dict[str, tuple[int, ...]] = {arg.arg: (i,) for i, arg in enumerate(definition.args.args[2:])}
-        parts: dict[str, Part] = {}
-        lines: list[Line] = []
+        statements, parts, result = _read(kernel.text)
         calls = _Calls()
-        for node in definition.body[:-1]:
-            if not _taken_apart(node, paths, parts):
-                lines += map(_line, calls.before(node))
-        last = definition.body[-1]
-        assert isinstance(last, ast.Return) and last.value is not None
-        return cls(kernel, parts, tuple(lines), _result(last.value))
+        lines = tuple(_line(line) for node in statements for line in calls.before(node))
+        return cls(kernel, parts, lines, result)
 
     def constant(self, uniform: Iterable[str]) -> frozenset[str]:
         """Of all names, those that are the same at every point if these parts are."""
@@ -130,13 +123,24 @@ class Straight(Struct, frozen=True):
         exec(compile(module, "<prelude>", "exec"), scope)
         return scope["prelude"]  # type: ignore[no-any-return]
 
-    def operations(self, constant: frozenset[str] = frozenset()) -> list[Operation]:
+    def operations(self, constant: frozenset[str]) -> list[Operation]:
         """What is left to be done at each point. Raises NotStraight."""
-        flat = _Flat()
-        for line in self.lines:
-            if not set(line.sets) <= constant:
-                flat.statement(line.node)
-        return flat.made
+        return _flattened(line.node for line in self.lines if not set(line.sets) <= constant)
+
+
+class Flat(Struct, frozen=True):
+    """All operations of a kernel that lead to its result, and the parts of arguments as in `Straight`."""
+
+    parts: dict[str, Part]
+    operations: list[Operation]
+    result: Result
+
+    @classmethod
+    def of(cls, kernel: Kernel) -> Flat:
+        """The operations of a plain kernel. Raises NotStraight."""
+        statements, parts, result = _read(kernel.text)
+        wanted = {name for cell in packed(result) for name in cell.parts()}
+        return cls(parts, needed(_flattened(statements), wanted), result)
 
 
 def needed(operations: Sequence[Operation], wanted: Iterable[str]) -> list[Operation]:
@@ -168,6 +172,18 @@ def packed(result: Result) -> Iterator[Packed]:
 
 
 # Statements
+
+
+def _read(text: str) -> tuple[list[ast.stmt], dict[str, Part], Result]:
+    """The statements of a plain kernel that work something out, the parts of arguments, and what is given back."""
+    definition = ast.parse(text).body[0]
+    assert isinstance(definition, ast.FunctionDef)
+    paths: dict[str, tuple[int, ...]] = {arg.arg: (i,) for i, arg in enumerate(definition.args.args[2:])}
+    parts: dict[str, Part] = {}
+    statements = [node for node in definition.body[:-1] if not _taken_apart(node, paths, parts)]
+    last = definition.body[-1]
+    assert isinstance(last, ast.Return) and last.value is not None
+    return statements, parts, _result(last.value)
 
 
 def _taken_apart(node: ast.stmt, paths: dict[str, tuple[int, ...]], parts: dict[str, Part]) -> bool:
@@ -264,7 +280,14 @@ def _number(node: ast.expr) -> str | None:
     return None
 
 
-class _Flat:
+def _flattened(statements: Iterable[ast.stmt]) -> list[Operation]:
+    flat = _Operations()
+    for node in statements:
+        flat.statement(node)
+    return flat.made
+
+
+class _Operations:
     """Statements as operations, each with a name of its own."""
 
     def __init__(self) -> None:

@@ -39,18 +39,18 @@ def joined(parts: Sequence[Estimate]) -> Estimate:
 
 
 def unfinished(like: Estimate, count: int) -> Estimate:
-    """The answer for members of a batch that nobody has evaluated: no number."""
+    """The answer for members of a batch that nobody has evaluated: no number, and no memory for any."""
 
     def unknown(x: Any, number: float) -> Any:
         if isinstance(x, tuple | list):
             return type(x)(unknown(item, number) for item in x)
-        return None if x is None else np.full(count, number)
+        return None if x is None else np.broadcast_to(number, (count,))
 
     return replace(
         like, value=unknown(like.value, np.nan), error=unknown(like.error, np.inf),
         tangent=unknown(like.tangent, np.nan), tangent_error=unknown(like.tangent_error, np.inf), converged=False,
         evals=0, seconds=0.0, compile_seconds=0.0, notes=(), stats={},
-        shortfalls={INTERRUPTED: np.ones(count, dtype=bool)}, member_converged=np.zeros(count, dtype=bool),
+        shortfalls={INTERRUPTED: np.broadcast_to(True, (count,))}, member_converged=np.broadcast_to(False, (count,)),
     )  # fmt: skip
 
 
@@ -79,7 +79,7 @@ def _notes(parts: Sequence[Estimate], sizes: Sequence[int]) -> tuple[OneSided, .
         rows = np.shape(first.forward)[:-1]
 
         def whole(name: str, notes: list[OneSided | None] = notes, rows: tuple[int, ...] = rows) -> Any:
-            sides = [np.full((*rows, n), np.nan) if note is None else np.broadcast_to(getattr(note, name), (*rows, n))
+            sides = [np.broadcast_to(np.nan if note is None else getattr(note, name), (*rows, n))
                      for note, n in zip(notes, sizes, strict=True)]  # fmt: skip
             return np.concatenate(sides, axis=-1)
 

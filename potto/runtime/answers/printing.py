@@ -11,7 +11,7 @@ error leaves certain to one unit.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from fractions import Fraction
 from typing import Any
 
@@ -193,6 +193,12 @@ def format_seconds(time: float) -> str:
 def format_count(number: int, thing: str) -> str:
     """`1 evaluation`, `1,234 evaluations`."""
     return f"{number:,} {thing}{'' if number == 1 else 's'}"
+
+
+def computed_by(stats: Mapping[str, Any]) -> str:
+    """What came up with the numbers of an evaluation."""
+    points = stats["points by machine code"]
+    return f"{format_count(points, 'point')} by machine code, the rest by numpy" if points else "by numpy"
 
 
 def format_range(low: float, high: float, digits: int = 6) -> str:

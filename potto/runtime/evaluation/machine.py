@@ -122,6 +122,7 @@ class Linker:
         key = (module, name)
         if key not in self.terms:
             self.terms[key] = self.ready(self.lookup(module, name))
+            counts.linked += 1
         return self.terms[key]
 
     def ready(self, term: Term) -> Term:

@@ -16,6 +16,7 @@ from potto.projects.settings import Settings
 from potto.reports.render import Located, ProgramError
 from potto.runtime.answers.estimate import Estimate
 from potto.runtime.answers.printing import (
+    computed_by,
     format_bars,
     format_count,
     format_digits,
@@ -101,20 +102,33 @@ def show_time(session: Conversation, text: str) -> Iterator[Part]:
     term = elaborate_expression(session.db, session.file, parsed.expr).term
     start = _lap(phases, "compile", start)
     program = session.world.program
+    linked = counts.linked
     program.linker.inexact(term)  # follows every definition that the term refers to
     _lap(phases, "link", start)
-    made, by_machine = counts.compiled, counts.native_points
+    linked = counts.linked - linked
     estimate = session.evaluate(text, session.settings).estimate
     phases["compile"] += estimate.compile_seconds
     phases["evaluate"] = max(estimate.seconds - estimate.compile_seconds, 0.0)
-    kernels = counts.compiled - made
     total = sum(phases.values())
     rows = [f"{name:<9} {format_seconds(spent):>9}  {spent / total:4.0%}" for name, spent in phases.items()]
-    cost = f"{format_count(kernels, 'kernel')} made, {format_count(estimate.evals, 'evaluation')}"
-    if counts.native_points > by_machine:
-        cost += f", {counts.native_points - by_machine:,} points by machine code"
-    rows += [f"{'total':<9} {format_seconds(total):>9}", cost]
-    yield Part("answer", "\n".join(rows), {"seconds": phases, "kernels": kernels, "evaluations": estimate.evals})
+    stats = {**estimate.stats, "definitions linked": linked + estimate.stats["definitions linked"]}
+    rows += [
+        f"{'total':<9} {format_seconds(total):>9}",
+        *_made(stats),
+        f"{format_count(estimate.evals, 'evaluation')}, {computed_by(stats)}",
+    ]
+    data = {"seconds": phases, "kernels": stats["kernels compiled"], "evaluations": estimate.evals, "stats": stats}
+    yield Part("answer", "\n".join(rows), data)
+
+
+def _made(stats: dict[str, Any]) -> Iterator[str]:
+    """What was made for an evaluation, and what was there."""
+    yield f"{format_count(stats['definitions linked'], 'definition')} linked"
+    compiled, kept, again = (stats[f"kernels {how}"] for how in ("compiled", "from disk", "reused"))
+    yield f"{format_count(compiled, 'kernel')} made, {kept:,} from the cache, {again:,} used again"
+    compiled, kept = (stats[f"machine code {how}"] for how in ("compiled", "from the cache"))
+    if compiled or kept:
+        yield f"{format_count(compiled, 'function')} of machine code made, {kept:,} from the cache"
 
 
 @command("timeit", argument="EXPR", completes="expression")
