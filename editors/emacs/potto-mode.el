@@ -56,6 +56,7 @@
     ("\\_<\\(fold\\)\\(?:\\s-+\\w+\\|\\s-*([^()]*)\\)\\s-*=[^=]" 1 font-lock-keyword-face)
     ("\\_<\\(with\\)\\s-+(?\\w+\\s-*=[^=]" 1 font-lock-keyword-face)
     ("^\\(record\\)\\s-+\\(\\w+\\)\\s-*(" (1 font-lock-keyword-face) (2 font-lock-type-face))
+    ("\"[^\"\n]*\"" 0 font-lock-string-face)
     ("∫\\|\\\\\\|λ" . font-lock-keyword-face)
     ("\\_<\\(d\\)(" 1 font-lock-keyword-face)
     (,(regexp-opt '("pi" "inf") 'symbols) . font-lock-constant-face)

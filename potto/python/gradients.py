@@ -143,13 +143,19 @@ def vjp(function: Function, cotangent: Any, wrt: Names = None) -> Callable[..., 
 
 
 @remade
-def jvp(function: Function, along: Mapping[str, Any]) -> Callable[..., Estimate]:
+def jvp(function: Function, along: Mapping[str, Any], *tangents: Any) -> Callable[..., Estimate]:
     """The product of the Jacobian with a vector: the derivative along a direction, over the parameters that it names.
 
     `potto.jvp(f, {"a": 1.0, "b": 2.0})(0.3, 0.6)` takes what `f` takes; the other parameters stand still. In the answer
     `tangent` is the derivative. Raises PottoError if the function has no such parameter, one of them is not a
-    number, or a tangent does not have the form of its parameter.
+    number, a tangent does not have the form of its parameter, or the direction is given as JAX takes it, by places.
     """
+    if tangents or not isinstance(along, Mapping):
+        name = next(iter(function.parameters), "") if isinstance(function, Function) else ""
+        raise wrong_call(
+            "`jvp` takes the direction alone, as a dict by the names of parameters",
+            f'write `potto.jvp(f, {{"{name or "x"}": 1.0}})(…)`: what it gives is called as `f` is',
+        )
     names = parameters_to_vary(function, tuple(along))
 
     def product(*args: Any, **kwargs: Any) -> Estimate:

@@ -11,6 +11,7 @@ from potto.syntax.nodes import (
     Binder,
     Clause,
     Comprehension,
+    ErrorExpr,
     Expr,
     Fold,
     Paren,
@@ -65,7 +66,10 @@ def reduction(context: Context, v: Values) -> Reduction:
 
 def fold(context: Context, v: Values) -> Fold:
     targets = tuple(Binder(p.span, p.name) for p in as_parameters(context, v[1], "state"))
-    return Fold(Span(v[0].start, v[7].span.end), targets, v[3], tuple(v[5]), _body(context, v[7]))
+    body = _body(context, v[7])
+    if not all(target.name for target in targets):  # told already; what the body calls the parts is not known
+        body = ErrorExpr(body.span, context.text[body.span.start : body.span.end])
+    return Fold(Span(v[0].start, v[7].span.end), targets, v[3], tuple(v[5]), body)
 
 
 def _body(context: Context, group: Group) -> Expr:

@@ -158,10 +158,14 @@ def _sum(stop: Stop) -> Diagnostic | None:
     word = stop.at if stop.at.kind == "SUM" else stop.before
     if opening is None or opening.kind != "LPAR" or word is None or word.kind != "SUM":
         return None
-    if loop_hint(stop):
-        return None
+    if hint := loop_hint(stop):
+        several = hint == SEVERAL and stop.at.kind == "SUM"
+        return kinds.UNEXPECTED(opening.span, "what goes through an array has one name", help=hint) if several else None
     message = "the variable of a `sum` stands without parentheses, its terms stand in them"
     return kinds.UNEXPECTED(opening.span, message, help="write `sum i in 1..n (body)`")
+
+
+SEVERAL = "give its parts one name together: `sum p in ps (p.0*p.1)`"
 
 
 def loop_hint(stop: Stop) -> str:
@@ -170,7 +174,7 @@ def loop_hint(stop: Stop) -> str:
     if (at.kind in ("SUM", "FOR") and _SEVERAL.match(rest)) or (
         at.kind == "IN" and stop.before is not None and stop.before.kind == "RPAR"
     ):
-        return "what goes through an array has one name: `sum p in ps (p.0*p.1)`"
+        return SEVERAL
     whole = _OF_ARRAY.match(rest) if at.kind == "SUM" else None
     return f"write `sum x in {whole[1]} (x)`" if whole is not None else ""
 

@@ -34,6 +34,7 @@ def test_a_session(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     assert "if [x + c > 0.5] then 1 else 0" in found["text-now"]
     keyword, function = "font-lock-keyword-face", "font-lock-function-name-face"
     assert found["faces"][:4] == [keyword, function, keyword, keyword]
+    assert found["file"] == "font-lock-string-face"
     assert found["indented"] == "    x"
 
 

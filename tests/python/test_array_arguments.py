@@ -123,6 +123,7 @@ def test_an_answer_keeps_its_error_as_an_array() -> None:
         (lambda: MODULE.total(np.ones((2, 3)), np.ones(4)), "do not broadcast"),
         (lambda: MODULE.total(np.array([True]), 1.0), "real numbers"),
         (lambda: potto.jvp(MODULE.total, {"xs": np.ones(4)})(np.ones(3), 1.0), "an array of 3"),
+        (lambda: potto.jvp(MODULE.total, (np.ones(3), 1.0), (np.ones(3), 0.0)), "as a dict by the names of parameters"),
         (lambda: potto.vjp(MODULE.scaled, np.ones(2), "xs")(np.ones(3), 1.0), "an array of 3"),
         (lambda: potto.vjp(MODULE.scaled, 1.0, "xs")(np.ones(3), 1.0), "an array of 3"),
         (lambda: potto.fit(MODULE.total, {"xs": "one"}, given={"k": 1.0}), "not at numbers"),

@@ -272,6 +272,10 @@ def test_names() -> None:
         #     ^^^^^^ error[P0115]: `(a, b)` is not a name: a parameter must be one
         def f(n) fold ((a, b), c) = ((1, 2), 3) for i in 1..n (((a + c, b), c))
         #              ^^^^^^ error[P0115]: `(a, b)` is not a name: a state must be one
+        fold ((a, b), c) = ((1, 2), 3) for i in 1..3 (((a + c, b), c))
+        #     ^^^^^^ error[P0115]: `(a, b)` is not a name: a state must be one
+        x = sum (a, b) in [(1, 2)] (a*b)
+        #       ^ error[P0103]: what goes through an array has one name
         def f(a=1) a
         #     ^^^ error[P0115]: a parameter can't have a default value
         x = integral [0, 1] x d(2*x)
