@@ -165,3 +165,18 @@ def test_a_long_formula_gives_way_while_it_is_written() -> None:
     assert describe(term, "f", "", resolve).tangent == "exp(c + c^2)*(2*c + 1)*dc"
     with pytest.raises(Enough):
         describe(term, "f", "", resolve, pause=pause)
+
+
+def test_roots_are_named_where_they_exist() -> None:
+    """No `nan`, no marks of copies, and no condition that always holds."""
+    found = explain("def f(r, d) integral (a ~ uniform(0, pi/2)) [abs(a - d) < r]*[cos(a) < d] d(a)", "f")
+    (item,) = found.integrals
+    roots = [root for surface in item.surfaces for root in surface.roots]
+    periodic = ["a = acos(d) + 2*k*pi for integers k", "a = 2*k*pi - acos(d) for integers k"]
+    assert roots == ["a = d - r", "a = r + d", *periodic]
+    assert found.conditions == ()
+
+
+def test_the_tangent_of_a_field_is_typeset_as_one() -> None:
+    found = explain("record S(at: Real)\ndef f(s: S) integral [0, 1] [x < s.at] d(x)", "f")
+    assert "∂s.at" in found.unicode(found.integrals[0].deltas[0])

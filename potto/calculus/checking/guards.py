@@ -6,8 +6,9 @@ says what is wrong; a person reads the formula and beside it, once, where it hol
 
 from __future__ import annotations
 
+from potto.calculus.algebra.ranges import range_of
 from potto.core.printer import format_term
-from potto.core.terms import Hole, If, Term, transform
+from potto.core.terms import Hole, If, Prim, Term, sub, transform
 
 
 def unguarded(term: Term) -> tuple[Term, tuple[str, ...]]:
@@ -16,8 +17,17 @@ def unguarded(term: Term) -> tuple[Term, tuple[str, ...]]:
 
     def change(node: Term, new: Term) -> Term:
         if isinstance(node, If) and isinstance(new, If) and isinstance(node.orelse, Hole) and node.orelse.measure:
-            conditions[format_term(node.condition)] = None
+            if not _always(node.condition):
+                conditions[format_term(node.condition)] = None
             return new.then
         return new
 
     return transform(term, change), tuple(conditions)
+
+
+def _always(condition: Term) -> bool:
+    """Whether it is a comparison of numbers that holds, as 0 < pi/2."""
+    match condition:
+        case Prim(op="lt", args=(left, right)):
+            return not condition.free and range_of(sub(right, left)).positive
+    return False

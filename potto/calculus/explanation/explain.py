@@ -26,9 +26,10 @@ from potto.calculus.explanation.plain_names import plainly_named
 from potto.calculus.explanation.readable import Progress, in_decimals, readable
 from potto.calculus.explanation.symbols import NoFormula, Rewrite, Words, over_functions
 from potto.calculus.inlining.expand import Resolve, heads_of
-from potto.calculus.solving.pivots import NoClosedForm, pivots
+from potto.calculus.solving.pivots import NoClosedForm, Root, pivots
 from potto.calculus.solving.solve import factors
 from potto.calculus.surfaces.branch_assignment import box_of, branches_of
+from potto.calculus.surfaces.branch_assignment import unguarded as where_it_exists
 from potto.calculus.surfaces.branch_cuts import opened
 from potto.calculus.surfaces.case_split import unnested
 from potto.core.printer import format_term
@@ -49,7 +50,9 @@ from potto.core.terms import (
     children,
     integral,
     lam,
+    stem,
     sub,
+    substitute,
     var,
 )
 from potto.diagnostics import PottoError
@@ -301,15 +304,23 @@ def _surfaces(node: Integral, tangents: Mapping[str, Term], words: Words) -> tup
             roots: list[str] = []
             try:
                 for root in pivots(node, factor)[0].roots:
-                    each = f" for integers {root.index}" if root.index else ""
-                    at = format_term(readable(simplify(words.fields(root.at)), frozenset()))
-                    roots.append(f"{root.variable} = {at}{each}")
+                    roots.append(f"{root.variable} = {_root(root, words)}")
             except NoClosedForm:
                 pass
             found[canonical] = SurfaceText(
                 equation(words.fields(factor)), tuple(sorted(factor.free & tangents.keys())), tuple(roots)
             )
     return tuple(found.values())
+
+
+def _root(root: Root, words: Words) -> str:
+    """A root where it exists; of many that recur, with the name of their index."""
+    at = where_it_exists(root.at)
+    index = root.index and stem(root.index)
+    if root.index and index and index not in at.free:
+        at = substitute(at, {root.index: var(index)})
+    text = format_term(readable(simplify(words.fields(at)), frozenset()))
+    return f"{text} for integers {index}" if index else text
 
 
 def _own_surfaces(body: Term, tangents: Mapping[str, Term]) -> tuple[SurfaceText, ...]:

@@ -141,6 +141,8 @@ class _Boxes:
                 return Row((self.of(array), Fenced("[", self.listed(indices), "]")))
             case nodes.Field(value=value, name=name):
                 return Row((self.of(value), Word(f".{name}", "words")))
+            case nodes.Member(path=path, name=name) if path in self.tangents:
+                return Row((self.name(path), Word(f".{name}", "words")))
             case _:
                 return Word(print_expression(node), "words")
 
