@@ -3,7 +3,7 @@
 Each line asks one thing that has been beyond some version of Potto, and says what should come of it: an accuracy, or a
 ratio of two costs in the same run. Times are those of the processor, on one thread, as others may use the machine. A
 line runs in a process of its own under a time limit, so no answer is an answer, too. `--against DIR` asks another
-checkout the same, in turns.
+checkout the same, in turns. `--page FILE` puts the table between the two marks of a page.
 """
 
 from __future__ import annotations
@@ -27,6 +27,7 @@ HERE = Path(__file__).resolve().parent.parent
 LIMIT = 60.0  # seconds of the processor for a line
 PATIENCE = 5  # times as long by the clock on the wall, where others use the processor
 PAIRS = 3
+BEGIN, END = "<!-- abilities -->", "<!-- /abilities -->"
 ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
 
 
@@ -113,10 +114,26 @@ def plain(finding: Finding) -> dict[str, Any]:
     return {k: str(v) if isinstance(v, float) and not math.isfinite(v) else v for k, v in shown.items()}
 
 
+def table(known: dict[str, Line], found: dict[str, list[Finding]]) -> str:
+    """What was found here as a table in Markdown."""
+    rows = []
+    for name, (finding, *_) in found.items():
+        line, met = known[name], "yes" if finding.met else "**no**"
+        rows.append(f"| {name} | {line.asked} | {line.goal} | {told(finding)} | {met} |")
+    return "\n".join(["| | asked | goal | found | met |", "|---|---|---|---|---|", *rows])
+
+
+def into_page(page: Path, text: str) -> None:
+    """Put a text between the marks of a page."""
+    before, rest = page.read_text(encoding="utf-8").split(BEGIN)
+    page.write_text(f"{before}{BEGIN}\n\n{text}\n\n{END}{rest.split(END)[1]}", encoding="utf-8")
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--only", metavar="NAME", action="append", help="only this line; may be repeated")
     parser.add_argument("--json", metavar="FILE", type=Path, help="put what was found there as well")
+    parser.add_argument("--page", metavar="FILE", type=Path, help="put the table of all lines into this page")
     parser.add_argument("--against", metavar="DIR", type=Path, help="another checkout that is asked the same")
     parser.add_argument("--pairs", type=int, default=PAIRS, help="how many turns with another checkout")
     parser.add_argument("--limit", type=float, default=LIMIT, help="seconds for a line (default %(default)s)")
@@ -137,6 +154,8 @@ def main() -> None:
         if options.json:
             shown = {n: {"goal": known[n].goal, "findings": [plain(f) for f in fs]} for n, fs in found.items()}
             options.json.write_text(json.dumps(shown, indent=1) + "\n", encoding="utf-8")
+    if options.page:
+        into_page(options.page, table(known, found))
     print(f"\n{sum(fs[0].met for fs in found.values())} of {len(found)} goals are met")
 
 

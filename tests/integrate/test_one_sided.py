@@ -192,3 +192,26 @@ def test_samples_tell_surfaces_on_bounds(method: Any) -> None:
     with potto.settings(method=method, samples=1024):
         (note,) = rate("integral ([0, 1], [0, 1]) [x < t]*y d(x, y)", 1.0).notes
     assert (note.backward, note.forward) == pytest.approx((0.5, 0.0), abs=1e-9) and "lies on a bound" in str(note)
+
+
+@pytest.mark.parametrize(
+    ("body", "t", "backward", "forward"),
+    [
+        ("integral (x ~ gamma(2, 1.5)) [x < t] d(x)", 0.0, 0.0, 0.0),  # the density falls like x
+        ("integral (x ~ beta(2, 1.5)) [x < t]*x d(x)", 1.0, 0.0, 0.0),  # like sqrt(1 - x)
+        ("integral [0, 1] [x < t]*sin(x)/x d(x)", 0.0, 0.0, 1.0),
+        ("integral [0, 1] [x < t]*exp(-1/x)/x d(x)", 0.0, 0.0, 0.0),
+    ],
+)
+def test_an_integrand_without_a_value_at_the_bound_has_its_limit(
+    body: str, t: float, backward: float, forward: float
+) -> None:
+    answer = rate(body, t)
+    sides = [(float(note.backward), float(note.forward)) for note in answer.notes] or [(answer.tangent,) * 2]
+    assert sides == [pytest.approx((backward, forward), abs=1e-7)] and answer.tangent_error < 1e-7
+
+
+@pytest.mark.parametrize("body", ["1/sqrt(x)", "log(x)", "1/100 - 1/log(x)"])
+def test_where_no_limit_shows_the_derivative_is_not_known(body: str) -> None:
+    answer = rate(f"integral [0, 1/2] [x < t]*{body} d(x)")
+    assert answer.tangent_error == INF and not answer.converged

@@ -38,6 +38,9 @@ BESIDE, CLEAR = 1e-7, 4.0
 # The part of the range of a variable over which what happens at a place where it is cut may be seen beside it: where a
 # radicand is the square of the distance from it, it is 0 to rounding up to 1e-8 from there.
 BESIDE_A_CUT = 2.0**-20
+# Where the limit of an integrand without a value at a bound is read off, as parts of the place; what is no difference
+# of such values, and what a power falls by at the least from one to the next.
+NEARER, RESTS, FALLS = (2.0**-30, 2.0**-40, 2.0**-50), 1e-7, 0.9
 
 
 class Scene(Struct, frozen=True):
@@ -83,7 +86,7 @@ class Scene(Struct, frozen=True):
                 odd = np.bitwise_xor.reduce([row[i] for i, other in enumerate(groups) if other == g])
                 way = np.asarray(beyond[g]) if groups.count(g) == 1 else ~np.asarray(inner[g])
                 both[g] = np.where(odd, way, inner[g])
-            f, e = self.inside(owner, here, both)
+            f, e = self.at_the_end(owner, here, both, above, room)
             for g in hidden.keys() - set(groups):
                 other, _ = self.inside(owner, here, {**both, g: np.asarray(both[g]) ^ hidden[g]})
                 e = np.where(other == f, e, np.nan)
@@ -93,6 +96,26 @@ class Scene(Struct, frozen=True):
         values, errors = (np.stack([np.broadcast_to(x, (m, owner.size)) for x in own]) for own in columns)
         at = which.reshape(*turned.shape[:-2], -1), slice(None), np.arange(owner.size)
         return np.moveaxis(values[at], -1, -2), np.moveaxis(errors[at], -1, -2)
+
+    def at_the_end(
+        self, owner: Ints, here: dict[str, Value], sides: dict[int, Mask], above: bool, room: Array | None
+    ) -> tuple[Array, Array]:
+        """F at places on some sides; where it has no value there, as densities may have none at the ends of their
+        ranges, what it tends to. room: as above."""
+        f, e = self.inside(owner, here, sides)
+        lost = np.nonzero((np.isnan(f) | np.isnan(e)).any(axis=0))[0]
+        x = here[self.level.variable]
+        if room is None or not lost.size or not isinstance(x, Cell):
+            return f, e
+        at, far = as_array(x.v, owner.size)[lost], np.minimum(room[lost], 1.0)
+        some, given = gather(here, lost), {g: take(m, lost) for g, m in sides.items()}
+        size = np.where(at == 0, far, np.abs(at)) * (1 if above else -1)
+        places = [{**some, self.level.variable: Cell(at + size * share)} for share in NEARER]
+        found = np.stack([self.inside(owner[lost], place, given)[0] for place in places])
+        limits = np.where(np.abs(size) * NEARER[0] < far, _limits(*found), np.nan)
+        f, e = (np.array(np.broadcast_to(part, np.broadcast_shapes(part.shape, f.shape))) for part in (f, e))
+        f[:, lost], e[:, lost] = limits, 0.0
+        return f, e
 
     def inside(self, owner: Ints, here: dict[str, Value], sides: dict[int, Mask]) -> tuple[Array, Array]:
         """F at places of some members, on the sides given, and its errors, (m, B): a check, for which nothing moves."""
@@ -112,6 +135,15 @@ class Scene(Struct, frozen=True):
 
     def surface(self, cut: int) -> Term:
         return self.level.level.cuts[cut].surface
+
+
+def _limits(far: Array, nearer: Array, nearest: Array) -> Array:
+    """What three values tend to: where they hardly change, or go to 0 like a power or faster; else nan."""
+    with np.errstate(all="ignore"):
+        rests = np.abs(nearest - nearer) <= RESTS * np.abs(nearest)
+        first, second = np.abs(nearer / far), np.abs(nearest / nearer)
+        falls = (nearest == 0) | ((second <= FALLS) & (second <= (1 + RESTS) * first))
+    return np.where(rests, nearest, np.where(falls, 0.0, np.nan))
 
 
 def count_places(scene: Scene, cuts: Cuts, sums: Sums) -> None:
