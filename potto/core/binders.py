@@ -12,6 +12,7 @@ from potto.core.walking import bound_names, children, fresh, rebuild, rename_bou
 
 # Of a term the names that binders in it bind, and whether one of them is bound by a binder around it too.
 Bound = dict[Term, tuple[frozenset[str], bool]]
+NOTHING: tuple[frozenset[str], bool] = frozenset(), False
 
 
 def apart(root: Term, known: Bound | None = None) -> Term:
@@ -21,9 +22,12 @@ def apart(root: Term, known: Bound | None = None) -> Term:
     """
     known = {} if known is None else known
     for node in unknown(root, known):
-        own, below = frozenset(bound_names(node)), [known[c] for c in children(node)]
+        own, below = bound_names(node), [found for c in children(node) if (found := known[c]) is not NOTHING]
+        if not own and len(below) < 2:  # nearly all terms
+            known[node] = below[0] if below else NOTHING
+            continue
         inside = frozenset[str]().union(*(names for names, _ in below))
-        known[node] = own | inside, any(clash for _, clash in below) or not own.isdisjoint(inside)
+        known[node] = inside.union(own), any(clash for _, clash in below) or not inside.isdisjoint(own)
     names, clash = known[root]
     return _Apart(names | root.free).run(root, root.free) if clash or not names.isdisjoint(root.free) else root
 

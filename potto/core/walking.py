@@ -237,18 +237,19 @@ def outside(root: Term, binders: tuple[type[Term], ...]) -> Iterator[Term]:
                 waiting.extend(children(node))
 
 
+_BOUND: dict[type, Callable[[Any], tuple[str, ...]]] = {
+    Lam: lambda t: t.params,
+    Integral: lambda t: t.variables,
+    Sum: lambda t: (t.variable,),
+    Array: lambda t: (t.variable,),
+    Fold: lambda t: (t.variable, t.state),
+}
+
+
 def bound_names(term: Term) -> tuple[str, ...]:
-    match term:
-        case Lam(params=params):
-            return params
-        case Integral(variables=variables):
-            return variables
-        case Sum(variable=variable) | Array(variable=variable):
-            return (variable,)
-        case Fold(variable=variable, state=state):
-            return (variable, state)
-        case _:
-            return ()
+    """The variables that a term binds in its parts."""
+    found = _BOUND.get(type(term))
+    return () if found is None else found(term)
 
 
 def fresh(name: str, taken: Iterable[str]) -> str:

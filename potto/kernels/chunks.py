@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from potto.kernels.cells import Cell, Number, Trace, Value, combined, map_arrays, map_trace
-from potto.kernels.compile import Runtime
 from potto.kernels.native.points import Pointwise
+from potto.kernels.writing import Runtime
 from potto.kernels.written import Kernel
 
 # Points at once: a few arrays of this length fit the second-level cache. A kernel of 60 operations takes 60 to 100 ns a

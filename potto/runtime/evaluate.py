@@ -30,8 +30,9 @@ from potto.runtime.evaluation.duals import call_derivative, call_paired
 from potto.runtime.evaluation.folds import fold
 from potto.runtime.evaluation.functions import Closure, Derivative
 from potto.runtime.evaluation.kinks import note_kink
-from potto.runtime.evaluation.machine import Linker, Machine, Record, Semantics
-from potto.runtime.evaluation.record import BOXES_FOR_EVALUATIONS
+from potto.runtime.evaluation.linker import Linker
+from potto.runtime.evaluation.machine import Machine, Semantics
+from potto.runtime.evaluation.record import BOXES_FOR_EVALUATIONS, Record
 from potto.runtime.evaluation.selection import chosen, lazy
 from potto.runtime.evaluation.sums import total
 
@@ -80,14 +81,14 @@ class Program:
     def __init__(
         self, lookup: Lookup, held: Mapping[tuple[str, str], Value] | None = None, places: Places | None = None
     ) -> None:
-        self.linker, self.places = Linker(lookup, SEMANTICS, held), places
+        self.linker, self.places = Linker(lookup, held), places
         self._direct: dict[Term, Direct | Around | None] = {}
 
     def machine(self, settings: Settings) -> Machine:
         record = Record(most_boxes=settings.max_evals // BOXES_FOR_EVALUATIONS)
         if record.gauge is not None:
             record.gauge.most = settings.max_evals
-        return Machine(self.linker, settings, record)
+        return Machine(self.linker, SEMANTICS, settings, record)
 
     def value(self, machine: Machine, term: Term, env: Mapping[str, Value] | None = None) -> Value:
         """The value of a term, with every internal limit turned into a PottoError."""

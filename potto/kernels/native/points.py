@@ -16,13 +16,13 @@ import numpy as np
 from msgspec import Struct
 
 from potto.kernels.cells import Array, Cell, Value
-from potto.kernels.compile import Runtime
 from potto.kernels.making import counts
 from potto.kernels.native.elementary import module
 from potto.kernels.native.objects import Loaded
 from potto.kernels.native.promotion import Promotion
 from potto.kernels.native.straight import NotStraight, Operation, Packed, Part, Result, Straight, needed, packed, read
 from potto.kernels.native.vectors import LANES, Vectors
+from potto.kernels.writing import Runtime
 from potto.kernels.written import Kernel
 
 NAME = "points"

@@ -1,7 +1,7 @@
 """Kernels' texts as straight lines of operations, and which of these don't depend on the point.
 
 Owns `Flat`, all operations of a kernel, and `Straight`, for which it is told what varies. The text of a plain kernel
-(`compile.py`) is its intermediate form: arguments are taken apart, numbers are computed one line after the other, cells
+(`writing`) is its intermediate form: arguments are taken apart, numbers are computed one line after the other, cells
 are put together. What depends only on arguments that are the same at every point is computed once, by the lines as they
 are; the rest are operations on numbers and masks.
 """

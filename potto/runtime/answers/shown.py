@@ -27,7 +27,7 @@ from potto.runtime.answers.printing import (
     with_error,
 )
 from potto.runtime.evaluation.functions import Derivative
-from potto.runtime.evaluation.machine import Linker
+from potto.runtime.evaluation.linker import Linker
 from potto.types.types import TupleOf, Type
 
 NOTHING: Mapping[str, Value] = MappingProxyType({})

@@ -1,13 +1,13 @@
 """The machine: what kernels ask for while they run.
 
-Owns `Machine`. It knows the program's definitions (through `Linker`), the settings and the record of one evaluation,
+Owns `Machine`. It knows the program's definitions (through a `Linker`), the settings and the record of one evaluation,
 and how many directions of differentiation are carried. Machines with other numbers of directions share everything
 else. Calls, lazy sides, sums and integrals of generated code come here.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
@@ -17,15 +17,11 @@ import numpy as np
 
 from potto.calculus.differentiation.deltas import PRODUCT_OF_DELTAS
 from potto.calculus.inlining.currying import sizes_of
-from potto.calculus.inlining.numbers import with_numbers
-from potto.calculus.surfaces.branch_cuts import opened
 from potto.core.terms import (
     Array,
     Branch,
     Data,
-    Deriv,
     Fold,
-    Global,
     Hole,
     If,
     Index,
@@ -36,7 +32,6 @@ from potto.core.terms import (
     Sum,
     Term,
     function_of,
-    postorder,
 )
 from potto.core.terms import Delta as DeltaTerm
 from potto.diagnostics import PottoError
@@ -53,9 +48,8 @@ from potto.kernels.written import Kernel
 from potto.projects.settings import Settings
 from potto.runtime.evaluation.arguments import fit, uncurried
 from potto.runtime.evaluation.functions import Chosen, Closure, Derivative, Paired
-from potto.runtime.evaluation.reach import Reach
+from potto.runtime.evaluation.linker import Linker
 from potto.runtime.evaluation.record import Record
-from potto.runtime.evaluation.written_in import WrittenIn
 
 DEEPEST_CALLS = 3000
 MOST_TERMS = 10_000_000
@@ -91,96 +85,6 @@ class Semantics:
     kink: Callable[[Machine, Prim, tuple[tuple[Any, Any], ...], tuple[Cell, ...]], None]
 
 
-class Linker:
-    """The definitions that a program refers to. `lookup` gives the term of a definition or raises PottoError.
-
-    held: definitions that have a value already, which is not computed again.
-    """
-
-    def __init__(
-        self,
-        lookup: Callable[[str, str], Term],
-        semantics: Semantics,
-        held: Mapping[tuple[str, str], Value] | None = None,
-    ) -> None:
-        self.lookup, self.semantics = lookup, semantics
-        self.held = held if held is not None else {}
-        self.terms: dict[tuple[str, str], Term] = {}
-        self.exactness: dict[Term, bool] = {}
-        self.reach = Reach(lambda name: self.term(name.module, name.name))
-        self.alike: dict[Any, Any] = {}
-        self.data: dict[Data, Value] = {}
-        self.placed: dict[tuple[Integral, bool], Integral] = {}
-        self.constants: dict[tuple[str, str, Settings], Value] = {}
-        self.duals: dict[tuple[Lam, bool], Lam] = {}
-        self.reaches: dict[tuple[Term, ...], tuple[tuple[str, str, bytes], ...]] = {}
-        self.written_in = WrittenIn(self.function)
-        # the ones met, without a lookup
-        self.kernels: dict[tuple[Lam, tuple[Pattern, ...], int, bool, bool, int, bool], Kernel] = {}
-
-    def term(self, module: str, name: str) -> Term:
-        key = (module, name)
-        if key not in self.terms:
-            self.terms[key] = self.ready(self.lookup(module, name))
-            counts.linked += 1
-        return self.terms[key]
-
-    def ready(self, term: Term) -> Term:
-        """The term as it is evaluated: with branch cuts told, and numbers in the place of their names."""
-        return with_numbers(opened(term), self._number)
-
-    def _number(self, name: Global) -> Term | None:
-        """The term of a definition that has no value yet; of a broken one nothing is said before it is needed."""
-        if (name.module, name.name) in self.held:
-            return None
-        try:
-            return self.lookup(name.module, name.name)
-        except PottoError:
-            return None
-
-    def inexact(self, term: Term) -> bool:
-        """Whether a value of the term may carry an integration error: whether an integral is reached from it."""
-        found = self.exactness.get(term)
-        if found is not None:
-            return found
-        self.exactness[term] = False  # while a recursion comes back here
-        result = False
-        for node in postorder(term):
-            if isinstance(node, Integral) or (
-                isinstance(node, Global) and self.inexact(self.term(node.module, node.name))
-            ):
-                result = True
-                break
-        self.exactness[term] = result
-        return result
-
-    def reached(self, *terms: Term) -> tuple[tuple[str, str, bytes], ...]:
-        """The definitions that terms lead to, with the digests of what they are: what a plan depends on."""
-        found = self.reaches.get(terms)
-        if found is None:
-            seen: dict[Global, bytes] = {}
-            todo: list[Term] = list(terms)
-            while todo:
-                for node in postorder(todo.pop()):
-                    if isinstance(node, Global) and node not in seen:
-                        term = self.term(node.module, node.name)
-                        seen[node] = term.digest
-                        todo.append(term)
-            found = tuple(sorted((g.module, g.name, digest) for g, digest in seen.items()))
-            self.reaches[terms] = found
-        return found
-
-    def function(self, head: Term) -> Lam | Deriv | None:
-        """The function, or derivative of one, that a Global leads to, through definitions that are other names."""
-        for _ in range(100):
-            if isinstance(head, Lam | Deriv):
-                return head
-            if not isinstance(head, Global):
-                return None
-            head = self.term(head.module, head.name)
-        return None
-
-
 @dataclass
 class Machine:
     """One evaluation, carrying `directions` tangents; `rounding` where rounding errors are kept track of.
@@ -194,6 +98,7 @@ class Machine:
     """
 
     linker: Linker
+    semantics: Semantics
     settings: Settings
     record: Record
     events: Events = field(default_factory=Events)
@@ -393,11 +298,11 @@ class Machine:
                 return function
             raise errors.wrong_call("this is called, but it is not a function", "to multiply, write `*`")
         if isinstance(function, Derivative):
-            return self.linker.semantics.derivative(self, function, groups, trace)
+            return self.semantics.derivative(self, function, groups, trace)
         if isinstance(function, Paired):
-            return self.linker.semantics.paired(self, function, groups, trace)
+            return self.semantics.paired(self, function, groups, trace)
         if isinstance(function, Chosen):
-            return self.linker.semantics.chosen(self, function, groups)
+            return self.semantics.chosen(self, function, groups)
         self.enter()
         whole, arities = uncurried(function.lam, sizes_of(groups))
         args = [function.captured[n] for n in sorted(function.captured)]
@@ -434,47 +339,47 @@ class Machine:
         """Note that a builtin stands at one of its kinks, if it does. kinks: what is 0 there, with errors."""
         for u, e in kinks:
             if np.any(np.abs(u) <= e):
-                return self.linker.semantics.kink(self, term, kinks, args)
+                return self.semantics.kink(self, term, kinks, args)
 
     def lazy(self, mask: Any, term: If | Branch, env: dict[str, Value], traces: tuple[Any, Any]) -> Value:
-        return self.linker.semantics.conditional(self, mask, term, env, traces)
+        return self.semantics.conditional(self, mask, term, env, traces)
 
     def added(self, terms: tuple[Term, ...], env: dict[str, Value]) -> Value:
-        return self.linker.semantics.added(self, terms, env)
+        return self.semantics.added(self, terms, env)
 
     def sum(self, term: Sum, lo: Value, hi: Value, env: dict[str, Value], trace: Trace | None) -> Value:
-        return self.linker.semantics.sum(self, term, lo, hi, env, trace)
+        return self.semantics.sum(self, term, lo, hi, env, trace)
 
     # Arrays
 
     def array(self, term: Array, size: Value, env: dict[str, Value]) -> Value:
-        return self.linker.semantics.array(self, term, size, env)
+        return self.semantics.array(self, term, size, env)
 
     def index(self, term: Index, whole: Value, place: Value) -> Value:
         try:
-            return self.linker.semantics.element(whole, place)
+            return self.semantics.element(whole, place)
         except PottoError as error:
             raise error.of(term) from None
 
     def length(self, term: Length, whole: Value, like: Value | None) -> Value:
         try:
-            return self.linker.semantics.length(self, whole, term.rising, like)
+            return self.semantics.length(self, whole, term.rising, like)
         except PottoError as error:
             raise error.of(term) from None
 
     def fold(self, term: Fold, lo: Value, hi: Value, start: Value, env: dict[str, Value]) -> Value:
-        return self.linker.semantics.fold(self, term, lo, hi, start, env)
+        return self.semantics.fold(self, term, lo, hi, start, env)
 
     def data(self, term: Data) -> Value:
         found = self.linker.data.get(term)
         if found is None:
-            found = self.linker.data[term] = self.linker.semantics.data(term)
+            found = self.linker.data[term] = self.semantics.data(term)
         return pad(found, self.directions)
 
     # Integrals
 
     def integral(self, term: Integral, env: dict[str, Value]) -> Value:
-        return self.linker.semantics.integral(self, term, env)
+        return self.semantics.integral(self, term, env)
 
 
 def _any_inexact(values: dict[str, Value]) -> bool:

@@ -15,7 +15,8 @@ from potto.calculus.surfaces.trace import spine
 from potto.core.terms import App, Integral, Lam, Term
 from potto.integrate.events import OneSidedDerivatives, TwoSided
 from potto.kernels.cells import Array, Cell, Value, all_cells, map_cells, pad
-from potto.runtime.evaluation.machine import Linker, Machine
+from potto.runtime.evaluation.linker import Linker
+from potto.runtime.evaluation.machine import Machine
 
 DEEPEST = 20  # definitions that a call may lead through
 SAME = 1e-12  # how far apart the derivatives on both sides may be beside their errors, as a part of them

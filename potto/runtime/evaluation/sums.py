@@ -44,7 +44,7 @@ def total(machine: Machine, term: Sum, lo: Value, hi: Value, env: dict[str, Valu
         return _reduce(machine.run(body, [wide[p] for p in params], None), shape, REACH)
     integrates = machine.linker.inexact(term.body)
     if integrates:
-        found = machine.linker.semantics.culled(machine, term, int(first), int(last), env)
+        found = machine.semantics.culled(machine, term, int(first), int(last), env)
         if found is not None:
             return found
     step = max(1, CHUNK // max(1, int(np.prod(shape))))

@@ -41,7 +41,8 @@ from potto.kernels.making import making
 from potto.runtime.answers.convergence import allowance_of_one, widest
 from potto.runtime.evaluation.duals import merge, split
 from potto.runtime.evaluation.functions import Closure
-from potto.runtime.evaluation.machine import Linker, Machine
+from potto.runtime.evaluation.linker import Linker
+from potto.runtime.evaluation.machine import Machine
 from potto.runtime.integration.arrays import met
 from potto.runtime.integration.choices import many, preferred
 from potto.runtime.integration.preparation import filled, placed, prepared
