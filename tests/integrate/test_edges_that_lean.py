@@ -64,3 +64,25 @@ def test_two_edges_that_cross_within_rounding() -> None:
     edges = "[2*x < -0.5 - t]*[2*x + 1.1102230246251565e-16*y < -0.25]"
     found = potto.deriv(potto.compile(f"def f(t) integral ([-1, 1], [-1, 1]) {edges} d(x, y)").f)((-0.25, 1.0))
     assert abs(found.tangent + 0.5) <= found.tangent_error
+
+
+LEANING = """
+def edge(a: (Real*, Real*), b: (Real*, Real*), x, y) (b.x - a.x)*(y - a.y) - (b.y - a.y)*(x - a.x)
+def area(a: (Real, Real), b: (Real, Real), c: (Real, Real))
+    integral ([207/512, 208/512], [304/512, 305/512])
+        [edge(a, b, x, y) >= 0 and edge(b, c, x, y) >= 0 and edge(c, a, x, y) >= 0] d(x, y)
+"""
+
+
+def test_a_corner_of_two_edges_that_lean_along_either_axis() -> None:
+    """They run along axes but for some doubles: what is beside the parameters is near by, not as far as no root of the
+    outer variable moves."""
+    a = (float.fromhex("0x1.6ed1c80cfc8bap-2"), float.fromhex("0x1.305f2dd0491a8p-1"))
+    b = (float.fromhex("0x1.9f39efe4e1eaap-2"), float.fromhex("0x1.305f2dd049478p-1"))
+    c = (float.fromhex("0x1.9f39efe4e248dp-2"), float.fromhex("0x1.489318f6bdce9p-1"))
+    found = potto.grad(potto.compile(LEANING).area, ["b"])(a, b, c)
+    (across, down), (off_across, off_down) = found.tangent, found.tangent_error
+    below = 305 / 512 - b[1]  # how far the pixel reaches below the corner; left of it, the triangle
+    assert abs(across - below * (1 - 0.5 * below / (c[1] - b[1]))) <= off_across < 1e-4 * across
+    left, whole = b[0] - 207 / 512, b[0] - a[0]
+    assert abs(down + left * (1 - 0.5 * left / whole)) <= off_down < -1e-3 * down

@@ -218,26 +218,33 @@ def _step(problem: Problem, plan: Plan, d: int, where: Fold | None) -> float | N
     here = {n: still(moved(v, both, d)) for n, v in env.items()}
     size = both.size
     outer = () if where is None else where.outer
-    for number, level in enumerate(plan.levels[: 1 + (0 if where is None else where.number)]):
+    fits, moves = np.ones(STEPS.size, dtype=bool), np.zeros(STEPS.size, dtype=bool)
+    for number, level in enumerate(plan.levels[: None if where is None else 1 + where.number]):
         values = quiet.evaluate(level.frame, {n: here[n] for n in level.frame.params}, None)
         assert isinstance(values, tuple)
         lo, hi, rows = frame_rows(level, values)
         rows += searched_rows(replace(level, searched=()), here, lo, hi, size, quiet)
         low, high = (np.broadcast_to(np.nan_to_num(end.v, posinf=1e300, neginf=-1e300), (size,)) for end in (lo, hi))
-        middle = 0.5 * low + 0.5 * high
-        here[level.variable] = Cell(np.full(size, outer[number]) if number < len(outer) else middle)
-    off = np.zeros(size)
-    for row in rows:
-        if where is None or row.cut == where.cut:
-            x = np.broadcast_to(row.x, (size,))
-            if where is None:
-                x = np.where((x >= np.minimum(low, high)) & (x <= np.maximum(low, high)), x, np.nan)
-            start = x[0] if np.isfinite(x[0]) else _near(x) if where is None else where.place
-            off = np.fmax(off, np.abs(x - start))
-    fits = (off <= APART * _room(low, high, rows, where))[1:].reshape(2, -1).all(axis=0)
-    moves = (off > 0)[1:].reshape(2, -1).any(axis=0)
+        here[level.variable] = Cell(np.full(size, outer[number]) if number < len(outer) else 0.5 * low + 0.5 * high)
+        if where is None or number == where.number:
+            off = _off(rows, low, high, where)
+            fits &= (off <= APART * _room(low, high, rows, where))[1:].reshape(2, -1).all(axis=0)
+            moves |= (off > 0)[1:].reshape(2, -1).any(axis=0)
     fits = np.logical_and.accumulate(fits) & moves
     return float(STEPS[np.nonzero(fits)[0][-1]]) if fits.any() else None
+
+
+def _off(rows: Sequence[Row], low: Array, high: Array, where: Fold | None) -> Array:
+    """How far each step moves those roots of a variable that fold, or all in its range."""
+    off = np.zeros(low.size)
+    for row in rows:
+        if where is None or row.cut == where.cut:
+            x = np.broadcast_to(row.x, low.shape)
+            if where is None:
+                x = _once_within(x, low, high)
+            start = x[0] if np.isfinite(x[0]) else _near(x) if where is None else where.place
+            off = np.fmax(off, np.abs(x - start))
+    return off
 
 
 def parameter_step(problem: Problem, d: int) -> float | None:
@@ -262,6 +269,13 @@ def _room(low: Array, high: Array, rows: Sequence[Row], where: Fold | None) -> A
     gaps = [abs(float(np.broadcast_to(x, reach.shape)[0]) - place) for x in others]
     near = [gap for gap in gaps if gap > TOGETHER * (1.0 + abs(place))]
     return np.minimum(room, min(near, default=np.inf))
+
+
+def _once_within(x: Array, low: Array, high: Array) -> Array:
+    """Where a root is after the steps after which it is in the range, and those beyond; nan after those before."""
+    inside = (x >= np.minimum(low, high)) & (x <= np.maximum(low, high))
+    after = np.logical_or.accumulate(inside[1:].reshape(2, -1), axis=1).ravel() | inside[0]
+    return np.where(np.concatenate((inside[:1], after)), x, np.nan)
 
 
 def _near(x: Array) -> Array:
