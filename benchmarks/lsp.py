@@ -13,13 +13,10 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 import random
 import statistics
 import sys
-import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +25,7 @@ from lsp_client import PUSHED, Client
 from lsp_peers import COLUMNS, compare
 from lsp_typing import type_like_a_person
 from lsp_whole import drawn, sizes_measured, table
-from lsp_workspace import workspace
+from lsp_workspace import workspace, written
 
 Row = tuple[str, str, float, str, float, float]  # gate, what, value, unit, goal, stretch
 
@@ -237,20 +234,6 @@ def main() -> None:
 def rows_of(texts: dict[str, str], rounds: int) -> Iterator[Row]:
     with written(texts) as folder:
         yield from measure(folder, texts, rounds)
-
-
-@contextmanager
-def written(texts: dict[str, str]) -> Iterator[Path]:
-    """The modules of a workspace in a folder, and nothing on disk from before."""
-    with tempfile.TemporaryDirectory(prefix="potto-bench-") as name, tempfile.TemporaryDirectory() as cache:
-        os.environ["POTTO_CACHE"] = cache
-        for module, text in texts.items():
-            (Path(name) / f"{module}.po").write_text(text)
-        lines = sum(text.count("\n") for text in texts.values())
-        print(f"{len(texts)} modules, {lines:,} lines, one of {texts['large'].count(chr(10)):,}", file=sys.stderr)
-        print(f"load {os.getloadavg()[0]:.1f} of {os.cpu_count()} processors", file=sys.stderr)
-        yield Path(name)
-        print(f"load {os.getloadavg()[0]:.1f}", file=sys.stderr)
 
 
 def show(row: Row, as_json: bool, ratio: float | None = None) -> None:

@@ -1,11 +1,18 @@
 """A workspace like a large project of one's own: 200 modules, 42,000 lines, one module of 2,000.
 
-Owns `workspace`, without arrays and with them. Definitions are of the size of those in the paper and in `examples/`:
-shaders, small integrals with a condition, helpers, documented; a module imports a few others that come before it, so
-that there are leaves, a middle and a top, and no cycles.
+Owns `workspace`, without arrays and with them, and `written`. Definitions are of the size of those in the paper and in
+`examples/`: shaders, small integrals with a condition, helpers, documented; a module imports a few others that come
+before it, so that there are leaves, a middle and a top, and no cycles.
 """
 
 from __future__ import annotations
+
+import os
+import sys
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
 
 MODULES, LINES, LARGE = 200, 42_000, 2_000
 
@@ -122,3 +129,17 @@ def workspace(arrays: bool = False) -> dict[str, str]:
     rest = (LINES - LARGE) // (MODULES - 1)
     sizes = {n: LARGE if module_name(n) == "large" else rest for n in range(MODULES)}
     return {module_name(n): module_text(n, lines, arrays) for n, lines in sizes.items()}
+
+
+@contextmanager
+def written(texts: dict[str, str]) -> Iterator[Path]:
+    """The modules of a workspace in a folder, and nothing on disk from before."""
+    with tempfile.TemporaryDirectory(prefix="potto-bench-") as name, tempfile.TemporaryDirectory() as cache:
+        os.environ["POTTO_CACHE"] = cache
+        for module, text in texts.items():
+            (Path(name) / f"{module}.po").write_text(text)
+        lines = sum(text.count("\n") for text in texts.values())
+        print(f"{len(texts)} modules, {lines:,} lines, one of {texts['large'].count(chr(10)):,}", file=sys.stderr)
+        print(f"load {os.getloadavg()[0]:.1f} of {os.cpu_count()} processors", file=sys.stderr)
+        yield Path(name)
+        print(f"load {os.getloadavg()[0]:.1f}", file=sys.stderr)
