@@ -142,6 +142,12 @@ def flat(value: Any, axes: int = 0) -> list[Any]:
     return list(np.moveaxis(np.reshape(value, (*np.shape(value)[:axes], -1)), -1, 0))
 
 
+def accurate(parts: Array, errors: Array, rtol: float, atol: float) -> bool:
+    """Whether no number of an image is off by more than was asked for, beside the largest that it shows."""
+    within = max(atol, rtol * largest(np.abs(parts)))
+    return bool((np.isnan(parts) | (errors <= within)).all())
+
+
 def largest(parts: Array) -> float:
     """The largest finite number; nan if there is none."""
     finite = parts[np.isfinite(parts)]

@@ -147,6 +147,7 @@ class Drawn(Struct):
     largest: float = float("nan")
     seconds: float = 0.0
     interrupted: bool = False
+    rough: dict[str, None] = field(default_factory=dict)  # why numbers are not as accurate as was asked
 
     @property
     def answers(self) -> list[Estimate]:
@@ -165,8 +166,7 @@ class Drawn(Struct):
         """Why numbers are not as accurate as was asked; that somebody did not want to wait is none."""
         from potto.runtime.answers.batches import INTERRUPTED
 
-        every = dict.fromkeys(reason for found in self.found for reason in found.reasons)
-        return [reason for reason in every if reason != INTERRUPTED.message]
+        return [reason for reason in self.rough if reason != INTERRUPTED.message]
 
     @property
     def unknown(self) -> int:
@@ -187,11 +187,15 @@ class Drawn(Struct):
         each = self.evaluations / (grid.width * grid.height * len(self.frames))
         return f"{each:.1f} evaluations a pixel, largest error {format_error(self.largest)}"
 
-    def take(self, found: Sampled, keep_errors: bool) -> None:
-        from potto.applications.images import largest
+    def take(self, found: Sampled, keep_errors: bool, picture: Picture, chosen: Settings) -> None:
+        """One more frame. What colours show is accurate beside the largest of an image, what numbers are by itself."""
+        from potto.applications.images import accurate, largest
 
         half = len(found.numbers) // 2
         errors = found.numbers[half:]
+        images = zip(_images(found.numbers[:half], picture.width), _images(errors, picture.width), strict=True)
+        if not picture.drawable or not all(accurate(*image, chosen.rtol, chosen.atol) for image in images):
+            self.rough.update(dict.fromkeys(found.reasons))
         self.frames.append(found.numbers[:half].copy())
         if keep_errors:
             self.errors.append(errors.copy())
@@ -199,6 +203,11 @@ class Drawn(Struct):
         self.largest = here if not self.largest >= here else self.largest
         found.numbers = errors[:0]
         self.found.append(found)
+
+
+def _images(parts: Any, width: int) -> list[Any]:
+    """The parts of the value, then those of each derivative."""
+    return [parts[first : first + width] for first in range(0, len(parts), width)]
 
 
 def drawn(
@@ -220,7 +229,7 @@ def drawn(
                 picture.given[picture.over[0]] = value
             progress.frame = number
             try:
-                found.take(sampled(picture.call, grid.middles(), progress), options.error)
+                found.take(sampled(picture.call, grid.middles(), progress), options.error, picture, chosen)
             except KeyboardInterrupt:
                 if not found.frames:
                     raise

@@ -347,6 +347,15 @@ def test_an_interrupted_picture_is_gray_where_nothing_was_done(tmp_path: Path) -
     assert int(gray[1].replace(",", "")) == np.isnan(value).sum() and 0 < np.isnan(value).mean() < 1
 
 
+def test_what_is_weak_is_accurate_beside_what_an_image_shows(potto: Potto) -> None:
+    """A pixel of 8e-10 with two digits is black beside one of 1; its number is to have the digits asked for."""
+    weak = "def f(x, y) if y > 0.5 then 1 else 1e-9 * integral ([0, 1], [0, 1]) [u^2 + v^2 < 1] d(u, v)\n"
+    words = ["s.po", "f", "--size", "2", "--method", "mc", "--samples", "1000", "--rtol", "1e-3"]
+    for target, told in (("f.png", False), ("f.npy", True)):
+        ran = potto("render", *words, "-o", target, s=weak)
+        assert ran.status == 0 and ("not as accurate" in ran.err) == told
+
+
 # Figures
 
 
