@@ -19,11 +19,11 @@ from typing import Any
 import numpy as np
 from msgspec import Struct
 
-from potto.core.terms import Const, children
+from potto.core.terms import children
 from potto.integrate.fixed.alone import Face, machine_code, promotion, summed_alone, summed_by
 from potto.integrate.fixed.moving_sums import Totals, evaluated, summed
 from potto.integrate.fixed.regions import Path, known, region_of, settle
-from potto.integrate.fixed.straight import CLEAR, Straight
+from potto.integrate.fixed.straight import CLEAR, Straight, nothing
 from potto.integrate.pieces import Evaluator, Sums
 from potto.integrate.rules.gauss import EPS
 from potto.integrate.rules.proved_orders import Cell as Stretch
@@ -69,7 +69,7 @@ def _cells(
         nonlocal shortest
         if i == len(plan.variables):
             face = plan.face(_sides(plan, tracked, here))
-            dark = isinstance(face, Const) and face.value == 0
+            dark = nothing(face)
             if machine.costs is not None:
                 machine.costs.stretches(1, 0 if dark else 1)
             if not dark:

@@ -19,7 +19,7 @@ from msgspec import Struct
 from potto.calculus.algebra.degree import degree, plane
 from potto.calculus.solving.enclosable import enclosable
 from potto.core.kinds import union_of
-from potto.core.terms import Branch, Const, Integral, Lam, Term, Tuple, children, function_of, postorder, tuple_
+from potto.core.terms import Branch, Integral, Lam, Term, function_of, postorder, tuple_
 from potto.integrate.fixed.box_text import NEAR
 from potto.integrate.fixed.straight import MOST_TERMS, Straight
 from potto.integrate.fixed.tensor_product import Bounds, Face
@@ -154,11 +154,6 @@ def sides_of(box: Box, machine: Evaluator, env: dict[str, Value], batch: int) ->
         off[:, part] = below + above
         codes[part] = _codes(box, machine, here, low[:, part] - below, high[:, part] + above, off[:, part])
     return Sides(Bounds(low, high, off if off.any() else None), codes)
-
-
-def dark(face: Term) -> bool:
-    """Whether an integrand is 0."""
-    return all(map(dark, children(face))) if isinstance(face, Tuple) else isinstance(face, Const) and face.value == 0
 
 
 def _ends(box: Box, machine: Evaluator, env: Mapping[str, Value], batch: int) -> tuple[Array, Array] | None:

@@ -15,9 +15,11 @@ from msgspec import Struct
 
 from potto.core.terms import (
     Branch,
+    Const,
     Integral,
     Lam,
     Term,
+    Tuple,
     children,
     function_of,
     postorder,
@@ -99,6 +101,11 @@ def straight(term: Integral, body: Term, levels: Sequence[LevelPlan]) -> Straigh
         for level, place in zip(levels, places, strict=True)
     )
     return Straight(term.variables, frames, jumps, turning, body, function_of(tuple_(surfaces)), tuple(sorted(free)))
+
+
+def nothing(face: Term) -> bool:
+    """Whether an integrand is 0."""
+    return all(map(nothing, children(face))) if isinstance(face, Tuple) else isinstance(face, Const) and face.value == 0
 
 
 def _distinct(frame: Lam) -> tuple[dict[int, int], Lam]:

@@ -14,11 +14,11 @@ from collections.abc import Collection
 import numpy as np
 from msgspec import Struct
 
-from potto.core.terms import Const, Term, children
+from potto.core.terms import Term, children
 from potto.integrate.columns import distinct
 from potto.integrate.fixed.lowered_topologies import Found, lowered_topologies
 from potto.integrate.fixed.moving_sums import evaluated
-from potto.integrate.fixed.straight import CLEAR, Straight
+from potto.integrate.fixed.straight import CLEAR, Straight, nothing
 from potto.integrate.fixed.topology_text import FARTHEST
 from potto.integrate.pieces import Evaluator, gather
 from potto.kernels.cells import Array, Bools, Cell, Ints, Number, Value
@@ -137,7 +137,7 @@ def _gathered(plan: Straight, machine: Evaluator, cells: Found) -> list[Alike]:
         codes.setdefault(face, []).append(code)
     for face, those in codes.items():
         own = np.any([sides == code for code in those], axis=0) if len(those) < FEW else np.isin(sides, those)
-        dark = isinstance(face, Const) and face.value == 0
+        dark = nothing(face)
         if machine.costs is not None:
             machine.costs.stretches(int(own.sum()), 0 if dark else int(own.sum()))
         for turn in () if dark else distinct(turns[own]):

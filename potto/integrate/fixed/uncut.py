@@ -13,12 +13,13 @@ from contextlib import AbstractContextManager, nullcontext
 
 import numpy as np
 
-from potto.core.terms import Const, Term, Tuple, children, function_of, tuple_
+from potto.core.terms import Term, function_of, tuple_
 from potto.integrate.columns import distinct
 from potto.integrate.fixed.box_text import DONE, Look
 from potto.integrate.fixed.boxes import UNCLEAR, Box, Sides, sides_of
 from potto.integrate.fixed.lowered import places_of
 from potto.integrate.fixed.lowered_boxes import LoweredBoxes, Passed
+from potto.integrate.fixed.straight import nothing
 from potto.integrate.fixed.tensor_product import ORDERS, Face, integrated
 from potto.integrate.pieces import Evaluator, Sums, gather
 from potto.kernels.cells import Array, Cell, Ints, Value
@@ -38,11 +39,6 @@ def uncut(box: Box, machine: Evaluator, env: dict[str, Value], batch: int) -> tu
         return _by_faces(box, machine, env, batch, able and not ways)
 
 
-def dark(face: Term) -> bool:
-    """Whether an integrand is 0."""
-    return all(map(dark, children(face))) if isinstance(face, Tuple) else isinstance(face, Const) and face.value == 0
-
-
 # Face by face
 
 
@@ -59,7 +55,7 @@ def _by_faces(
         if code == UNCLEAR:
             continue
         face, index = box.face(code), np.nonzero(sides.codes == code)[0]
-        if dark(face.term):
+        if nothing(face.term):
             done[index] = True
             continue
         for where, found in _of_face(box, face, sides, machine, env, index, able):
@@ -105,7 +101,7 @@ def _deciding(box: Box, machine: Evaluator, env: dict[str, Value]) -> tuple[Lowe
     faces: dict[Term, list[int]] = {}
     for code in range(1 << len(box.places)):
         term = box.face(code).term
-        if not dark(term):
+        if not nothing(term):
             faces.setdefault(term, []).append(code)
     if len(faces) > MOST_FACES:
         return ()
