@@ -102,7 +102,8 @@ def _picture(entry: Picture, chapter: Chapter, out: Path, stem: str, quick: bool
     ]
     words += [f"{name}={value}" for name, value in entry.given]
     words += ["--size", f"{width}x{height}", "--box", ",".join(map(str, entry.box))]
-    words += [word for name, value in entry.set for word in ("--set", f"{name}={value}")]
+    if entry.pixel:
+        words += ["--set", f"{entry.pixel}=({entry.box[1]} - {entry.box[0]})/{width}"]
     words += [word for name in entry.wrt for word in ("--wrt", name)]
     said, trouble = io.StringIO(), io.StringIO()
     with contextlib.redirect_stdout(said), contextlib.redirect_stderr(trouble):

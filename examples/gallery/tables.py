@@ -20,6 +20,7 @@ wrt = ["q"]                            # derivatives by these, each a picture
 size = [256, 256]
 quick = [16, 16]                       # the size of a quick pass
 box = [-1, 1, -1, 1]
+pixel = "h"                            # the name of the program that is the width of a pixel
 options = ["--tone", "srgb"]           # more of the options of `potto render`
 
 [[driver]]                             # what takes Python: `pictures(folder, quick)` of a file in this folder
@@ -59,7 +60,7 @@ class Picture:
     quick: tuple[int, int] = (16, 16)
     box: tuple[float, float, float, float] = (0.0, 1.0, 0.0, 1.0)
     given: tuple[tuple[str, str], ...] = ()
-    set: tuple[tuple[str, str], ...] = ()
+    pixel: str = ""
     wrt: tuple[str, ...] = ()
     options: tuple[str, ...] = ()
     about: str = ""
