@@ -37,7 +37,7 @@ def ffmpeg() -> str | None:
 def complaint(path: str) -> str | None:
     """Why an animation can't be written, for a person; None if it seems that it can."""
     if ending_of(path) == ".mp4" and ffmpeg() is None:
-        return "`.mp4` needs the program ffmpeg, which is not here: install it, or the package imageio-ffmpeg; a .gif does without"
+        return "`.mp4` needs the program ffmpeg: install it, or the package imageio-ffmpeg; a .gif does without"
     return plain_complaint(path, NEEDS)
 
 
