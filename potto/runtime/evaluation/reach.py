@@ -1,20 +1,26 @@
 """What terms lead to, through definitions: derivatives, jumps, integrals.
 
-Owns `Reach`.
+Owns `Reach`, and `kept` for what follows from that.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import wraps
+from typing import Any, ParamSpec, TypeVar
 
 from potto.calculus.inlining.arrays import ARRAYS
 from potto.calculus.inlining.expand import Resolve
 from potto.core.terms import Branch, Delta, Deriv, Global, Index, Integral, Prim, Term, Var, outside, postorder
 from potto.primitives import PRIMITIVES
 
+MOST_KEPT = 4096  # results of one function
+P = ParamSpec("P")
+R = TypeVar("R")
+
 
 class Reach:
-    """What is reached from terms, through definitions."""
+    """What is reached from terms, through definitions. results: of functions, by their other arguments (`kept`)."""
 
     def __init__(self, resolve: Resolve) -> None:
         self.resolve = resolve
@@ -22,6 +28,7 @@ class Reach:
         self.known_branches: dict[Term, int] = {}
         self.known_derived: dict[Term, frozenset[type]] = {}
         self.known_spikes: dict[Term, bool] = {}
+        self.results: dict[Any, dict[Any, Any]] = {}
 
     def kinds(self, term: Term) -> frozenset[type]:
         """Deriv, Branch and Integral, where there are such terms; Prim for a builtin with a kink, Index for what has to
@@ -85,3 +92,23 @@ class Reach:
                 yield Index
             elif isinstance(node, Prim) and PRIMITIVES[node.op].kinks(*node.args):
                 yield Prim
+
+
+def kept(function: Callable[P, R]) -> Callable[P, R]:
+    """The function, whose last argument is a `Reach`, with its results kept there: they go with the program, where a
+    cache of the function would keep the program."""
+
+    @wraps(function)
+    def known(*args: P.args, **others: P.kwargs) -> R:
+        *key, reach = args
+        assert isinstance(reach, Reach) and not others
+        results = reach.results.setdefault(function, {})
+        terms = tuple(key)
+        if terms not in results:
+            if len(results) >= MOST_KEPT:
+                results.clear()
+            results[terms] = function(*args, **others)
+        found: R = results[terms]
+        return found
+
+    return known

@@ -19,7 +19,7 @@ from potto.kernels.cells import Cell, Number, Value
 from potto.kernels.making import making
 from potto.runtime.evaluation.functions import Closure
 from potto.runtime.evaluation.machine import Machine
-from potto.runtime.evaluation.reach import Reach
+from potto.runtime.evaluation.reach import Reach, kept
 
 TOO_LONG = declare("P0515", "a loop under an integral is too long to be written out")
 
@@ -62,7 +62,7 @@ def without_arrays(machine: Machine, term: Integral, env: Env) -> tuple[Term, En
     return _read(machine, term, accesses, env)
 
 
-@lru_cache(maxsize=4096)
+@kept
 def _outside(term: Integral, arrays: frozenset[str], reach: Reach) -> Term:
     found = by_cells(inlined(term, lambda name: Index in reach.kinds(name), reach.resolve, arrays))
     if isinstance(found, Integral):  # else its cells are sums around it already

@@ -6,7 +6,6 @@ Owns `culled`. What is left is one batch of pairs, a member and a summand each; 
 from __future__ import annotations
 
 import operator
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -26,7 +25,7 @@ from potto.kernels.whole import UNIT_ROUNDOFF
 from potto.runtime.answers.convergence import merged, over, widest
 from potto.runtime.evaluation.functions import Closure
 from potto.runtime.evaluation.machine import Machine
-from potto.runtime.evaluation.reach import Reach
+from potto.runtime.evaluation.reach import Reach, kept
 from potto.runtime.integration.arrays import holds, in_names
 from potto.runtime.integration.preparation import filled
 
@@ -56,7 +55,7 @@ def culled(machine: Machine, term: Sum, first: int, last: int, env: Env) -> Valu
     return _added(machine, term, pairs, first, env, shape)
 
 
-@lru_cache(maxsize=1024)
+@kept
 def _integral(body: Term, reach: Reach) -> Integral | None:
     """The integral that a summand is in proportion to."""
     if not isinstance(body, Integral) and Integral in reach.kinds(body):
@@ -69,7 +68,7 @@ def _integral(body: Term, reach: Reach) -> Integral | None:
     return body if isinstance(body, Integral) else None
 
 
-@lru_cache(maxsize=1024)
+@kept
 def _plain(body: Term, reach: Reach) -> bool:
     """Whether a summand is an integral without a factor, so that what is added up is what it comes to."""
     if not isinstance(body, Integral) and Integral in reach.kinds(body):
@@ -84,7 +83,7 @@ class _Open(Struct, frozen=True):
     accesses: tuple[Access, ...]
 
 
-@lru_cache(maxsize=1024)
+@kept
 def _opened(term: Integral, arrays: frozenset[str], reach: Reach) -> _Open | None:
     found = summands(inlined(term, lambda name: Index in reach.kinds(name), reach.resolve, arrays))
     if not isinstance(found, Integral) or loops(found):

@@ -46,7 +46,7 @@ from potto.diagnostics import PottoError, declare
 from potto.kernels import errors
 from potto.kernels.cells import Value
 from potto.runtime.evaluation.functions import Closure, Derivative
-from potto.runtime.evaluation.reach import Reach
+from potto.runtime.evaluation.reach import Reach, kept
 from potto.runtime.integration.arrays import holds
 
 NOT_COUNTED = declare("P0510", "deltas of a derivative that were not found")
@@ -54,7 +54,7 @@ NOT_COUNTED = declare("P0510", "deltas of a derivative that were not found")
 FEW = 4  # branches that one integrand may have before its summands are integrated apart
 
 
-@lru_cache(maxsize=4096)
+@kept
 def prepared(term: Integral, reach: Reach) -> Term:
     """An equal term, or the same one where there is nothing to be done. Raises PottoError (a product of deltas)."""
     deltas = [node for node in postorder(term.body) if isinstance(node, Delta)]
