@@ -149,7 +149,7 @@ def _polynomial(degrees: Degrees, atom: Term) -> tuple[Step, ...] | None:
     if highest == 1:
         roots: tuple[Term, ...] = (quotient(minus(coefficients[0]), coefficients[1]),)
     else:
-        roots = quadratic(coefficients[2], coefficients[1], coefficients[0])
+        roots = quadratic(coefficients[2], coefficients[1], coefficients[0], merging=unit == 1)
     return (*steps, *(Step(inner, r) for r in roots))
 
 
@@ -166,8 +166,9 @@ def _common(differences: Iterable[Fraction]) -> Fraction | None:
     return Fraction(top, scale)
 
 
-def quadratic(a: Term, b: Term, c: Term) -> tuple[Term, Term]:
-    """Both roots of a z^2 + b z + c without cancellation; where a is 0, one of them is the root of b z + c."""
+def quadratic(a: Term, b: Term, c: Term, merging: bool) -> tuple[Term, Term]:
+    """Both roots of a z^2 + b z + c without cancellation; where a is 0, one of them is the root of b z + c. merging:
+    whether both are to be told where both are 0."""
     half = halved(b)
     if half is None:
         disc = shorter(sub(pow_(b, TWO), mul(const(4.0), a, c)))
@@ -178,7 +179,7 @@ def quadratic(a: Term, b: Term, c: Term) -> tuple[Term, Term]:
         root = square_root(disc)
         q = signed(half, neg(add(half, root)), sub(root, half))
     one, other = quotient(q, a), quotient(c, q)
-    if any(bounds.positive or bounds.negative for bounds in map(range_of, (b, c))):
+    if not merging or any(bounds.positive or bounds.negative for bounds in map(range_of, (b, c))):
         return one, other
     return one, branch((neg(prim("abs", q)),), False, one, other)  # where q is 0 both are
 
