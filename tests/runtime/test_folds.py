@@ -243,6 +243,29 @@ def test_least_and_largest_move_with_the_one_that_is_taken(xs: list[float], k: f
         assert found["k"] == pytest.approx(xs[at] ** 2, rel=1e-14, abs=1e-300)
 
 
+@pytest.mark.parametrize("op", ["max", "min"])
+def test_where_several_are_the_greatest_or_the_least_both_derivatives_are_told(op: str) -> None:
+    """Of t, 2*t and 0*t at t = 0, written out or not, by t alone or by every number, to either side."""
+    m = potto.compile(f"""
+def f(xs: [n] Real, t) {op} i in 0..n-1 (xs[i]*t)
+def g(t) {op}(t, 2*t, 0*t)
+def h(t) sum k in 1..2 (k*({op} i in 1..3 ((3 - i)*t))) - ({op} i in 0..2 (i*t))
+def whole(t) integral [0, 1] 3*u*({op} i in 0..2 (i*t)) d(u)
+def first(xs: [n] Real) {op} x in xs (x)
+""")
+    backward, forward = (0, 2) if op == "max" else (2, 0)
+    xs = np.array([1.0, 2, 0])
+    found = [potto.grad(m.g)(0.0), potto.grad(m.f, "t")(xs, 0.0), potto.jvp(m.f, {"t": 1.0})(xs, 0.0)]
+    found += [m.eval("deriv(h)((0, 1))"), m.eval("deriv(whole)((0, 1))")]
+    for each, times in zip(found, (1, 1, 1, 2, 1.5), strict=True):  # of h 1 + 2 - 1 times, of `whole` 3/2
+        (note,) = each.notes
+        assert (note.backward, note.forward) == (times * backward, times * forward)
+        assert each.tangent in (note.backward, note.forward)
+    wide = potto.grad(m.f, ["xs", "t"])(np.tile(xs, 5), 0.0)  # for so many a tape is tried first
+    assert wide.tangent[1] in (backward, forward) and not wide.tangent[0].any() and wide.notes
+    assert potto.grad(m.first)(np.ones(20)).tangent.tolist() == [1] + [0] * 19  # one of them is taken
+
+
 def test_a_product_of_a_batch() -> None:
     found = potto.grad(FOLDS.factors, "k")(np.array([1.0, 0.0, 3.0]), np.array([0.0, 0.5]))
     assert found.value.tolist() == [0.0, 1.5 * 0.5 * 3.5]

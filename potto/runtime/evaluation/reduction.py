@@ -1,6 +1,7 @@
 """Products, least and largest of many: folds whose steps do not look at the state, all at once.
 
-Owns `reduced`.
+Owns `reduced`. Where several numbers are the least or the greatest, to each side another one goes on to be it: the
+answer has the derivative to one side, and outside of integrals both are told, as of `min` and `max` of two.
 """
 
 from __future__ import annotations
@@ -9,11 +10,16 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from msgspec import Struct
 
-from potto.core.terms import Fold, Prim, Term, Var, lam, mul
+from potto.core.terms import Fold, Prim, Term, Var, const, lam, mul
+from potto.core.walking import substitute
+from potto.integrate.events import OneSidedDerivatives, TwoSided
 from potto.kernels.cells import Array, Cell, Number, Value, all_arrays
-from potto.kernels.tape import Node, linear
+from potto.kernels.tape import Node, Untaped, linear
 from potto.kernels.whole import LARGEST, UNIT_ROUNDOFF, looked_through
+from potto.primitives import PRIMITIVES
+from potto.runtime.evaluation.kinks import ROUNDING
 from potto.runtime.evaluation.machine import Machine
 
 MOST_POINTS = 1 << 24
@@ -39,8 +45,14 @@ def reduced(machine: Machine, term: Fold, places: range, start: Value, env: Env)
         return None
     count = (len(places), *shape)
     numbers = np.concatenate([_row(start.v, (1, *shape)), _row(value.v, count)])
-    slopes = _REDUCTIONS[op](numbers)
-    return _made(machine, op, numbers, slopes, start, value)
+    found = _made(machine, op, numbers, _REDUCTIONS[op](numbers), start, value)
+    ties = None if op == "mul" else _ties(machine, op, numbers, start, value, found)
+    if ties is None:
+        return found
+    if machine.root and not machine.side and not machine.frozen and ties.differ.any():
+        terms = [substitute(element, {term.variable: const(places[at - 1])}) if at else term.start for at in ties.two]
+        _note(machine, ties, TwoSided("", PRIMITIVES[op].kinks(*terms)[0], kink=True))
+    return ties.on_side(found, machine.side) if machine.side else found
 
 
 def _step(term: Fold) -> tuple[str, Term] | None:
@@ -74,6 +86,81 @@ def _taken(numbers: Array, at: Any) -> Array:
     """1 for the number that is taken, 0 for the others."""
     places = np.arange(len(numbers), dtype=float).reshape(-1, *(1,) * (numbers.ndim - 1))
     return np.where(places == at, 1.0, 0.0)
+
+
+class _Ties(Struct, frozen=True):
+    """Numbers that are the least or the greatest together: which, where there are several, and for each direction all
+    tangents, those to both sides and how far off these may be."""
+
+    near: Any
+    several: Any
+    slopes: Array
+    backward: Array
+    before: Array
+    forward: Array
+    beyond: Array
+
+    @property
+    def differ(self) -> Array:
+        """Where, in which direction, it matters which of them goes on."""
+        found: Array = self.several & (self.backward != self.forward)
+        return found
+
+    @property
+    def two(self) -> list[int]:
+        """Two that go different ways, for the first member for which it matters."""
+        d, *member = np.argwhere(self.differ)[0]
+        equal = np.flatnonzero(self.near[:, *member])
+        slopes = self.slopes[d][equal, *member]
+        return sorted((int(equal[slopes.argmin()]), int(equal[slopes.argmax()])))
+
+    def on_side(self, found: Cell, side: int) -> Cell:
+        """The number with its tangents to one side."""
+        chosen, off = (self.backward, self.before) if side < 0 else (self.forward, self.beyond)
+        t, et = list(found.t), list(found.et)
+        for d, (tangent, error) in enumerate(zip(found.t, found.et, strict=True)):
+            if tangent is not None:
+                t[d] = _plain(np.where(self.several, chosen[d], tangent))
+                et[d] = _plain(np.where(self.several, off[d], 0.0 if error is None else error))
+        return Cell(found.v, found.e, tuple(t), tuple(et))
+
+
+def _ties(machine: Machine, op: str, numbers: Array, start: Cell, value: Cell, found: Cell) -> _Ties | None:
+    """Where several numbers are it, to rounding, of which some move. Raises Untaped: sides are those of directions."""
+    if all(x is None for x in (*start.t, *value.t)):
+        return None
+    off = _both(start.e, value.e, numbers) + (0.0 if found.e is None else found.e)
+    near = np.abs(numbers - found.v) <= np.minimum(off, ROUNDING * (np.abs(numbers) + np.abs(found.v)))
+    several = near.sum(axis=0) > 1
+    if not several.any():
+        return None
+    if machine.taping:
+        raise Untaped
+    each = range(machine.directions)
+    slopes = np.array([_both(_at(start.t, d), _at(value.t, d), numbers) for d in each])
+    wrong = np.array([_both(_at(start.et, d), _at(value.et, d), numbers) for d in each])
+    least = _bounded(lambda x: np.where(near, x, np.inf).min(axis=1), slopes, wrong)
+    most = _bounded(lambda x: np.where(near, x, -np.inf).max(axis=1), slopes, wrong)
+    return _Ties(near, several, slopes, *least, *most) if op == "max" else _Ties(near, several, slopes, *most, *least)
+
+
+def _bounded(extreme: Callable[[Array], Array], numbers: Array, wrong: Array) -> tuple[Array, Array]:
+    """The least or the greatest of numbers, and how far off it may be as they are."""
+    found = extreme(numbers)
+    return found, np.maximum(extreme(numbers + wrong) - found, found - extreme(numbers - wrong))
+
+
+def _at(parts: tuple[Number | None, ...], direction: int) -> Any:
+    return parts[direction] if parts else None
+
+
+def _note(machine: Machine, ties: _Ties, cause: TwoSided) -> None:
+    """Tell both derivatives."""
+    if any(edge.cause == cause for edge in machine.record.edges):
+        return
+    where = ties.differ.any(axis=0)
+    sides = (np.where(where, side, np.nan) for side in (ties.backward, ties.forward, ties.before, ties.beyond))
+    machine.record.edges.append(OneSidedDerivatives(cause, *sides))
 
 
 _REDUCTIONS: dict[str, Callable[[Array], Array]] = {

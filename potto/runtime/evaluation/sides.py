@@ -31,7 +31,8 @@ def as_a_whole(machine: Machine, term: Term, run: Callable[[Machine], Value]) ->
     known = len(record.edges)
     value = run(machine)
     met = record.edges[known:]
-    if not met or machine.side or machine.taping or _one_integral(machine.linker, term):
+    within = all(edge.cause.variable for edge in met)  # what an integral has met, none of the numbers that it is given
+    if not met or machine.side or machine.taping or (within and _one_integral(machine.linker, term)):
         return value
     kept = dict(record.shortfalls), record.edges[:known], record.within
     value = pad(value, machine.directions)
