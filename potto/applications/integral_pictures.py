@@ -110,14 +110,13 @@ def told(view: IntegralView, numbers: IntegralNumbers | None, wrt: str) -> list[
 
     names = ("value", f"derivative by {wrt}", "interior", "boundary")
     if numbers is None:
-        return [(name, WAITING) for name in (*names, "central difference:")]
+        return [(name, WAITING) for name in (*names, f"central difference, {wrt}:")]
     n = numbers
     pairs = ((n.value, n.error), (n.tangent, n.tangent_error), (n.interior, n.interior_error),
              (n.boundary, n.boundary_error))  # fmt: skip
     found = [(name, with_error(*pair)) for name, pair in zip(names, pairs, strict=True)]
-    if n.difference is None:
-        return [*found, ("central difference:", WAITING)]
-    return [*found, (f"central difference, {wrt} ± {format_digits(n.step, 2)}:", format_digits(n.difference, 8))]
+    difference = WAITING if n.difference is None else format_digits(n.difference, 8)
+    return [*found, (f"central difference, {wrt} ± {format_digits(n.step, 2)}:", difference)]
 
 
 def remarks(view: IntegralView) -> list[str]:
@@ -165,11 +164,12 @@ def _cells(view: IntegralView, frame: _Frame, colours: Sequence[tuple[int, int, 
     rgba = np.concatenate([rgb, np.where(cells < 0, 0.0, 255.0)[:, :, None]], axis=2)
     rows, columns = cells.shape
     data = base64.b64encode(encode(rgba[::-1].astype(np.uint8).tobytes(), columns, rows, quick=True)).decode()
-    # A pixel is around its place: half of one is beyond each side.
+    # A pixel is around its place: half of one is beyond each side, and cut off.
     wide, tall = frame.wide / (columns - 1), frame.tall / (rows - 1)
-    return [f'<image x="{LEFT - wide / 2:.1f}" y="{TOP - tall / 2:.1f}" width="{frame.wide + wide:.1f}" '
-            f'height="{frame.tall + tall:.1f}" image-rendering="pixelated" '
-            f'preserveAspectRatio="none" href="data:image/png;base64,{data}"/>']  # fmt: skip
+    return [f'<image x="{LEFT - wide / 2:.2f}" y="{TOP - tall / 2:.2f}" width="{frame.wide + wide:.2f}" '
+            f'height="{frame.tall + tall:.2f}" clip-path="inset({tall / 2:.2f}px {wide / 2:.2f}px)" '
+            f'image-rendering="pixelated" preserveAspectRatio="none" '
+            f'href="data:image/png;base64,{data}"/>']  # fmt: skip
 
 
 def _path(lines: Iterable[Line], frame: _Frame, flat: bool) -> str:

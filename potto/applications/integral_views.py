@@ -111,15 +111,16 @@ def numbers(
     if abs(rest) <= max(error, TINY * max(abs(both.tangent), abs(inner.value))):
         rest, error = 0.0, error if rest else 0.0
     difference, off, evals = None, 0.0, both.evals + inner.evals
-    if step is not None or not quick:
-        step = STEP * max(1.0, abs(given[wrt])) if step is None else step
+    wanted = step is not None or not quick
+    step = STEP * max(1.0, abs(given[wrt])) if step is None else step
+    if wanted:
         sides = {**given, wrt: given[wrt] + step * np.array([-1.0, 1.0])}
         beside = whole(*(sides[name] for name in region.whole.params))
         difference, off = float(np.diff(beside.value)[0]) / (2 * step), float(np.sum(beside.error)) / (2 * step)
         evals += beside.evals
     return IntegralNumbers(
         float(both.value), float(both.error), float(both.tangent), float(both.tangent_error),
-        float(inner.value), float(inner.error), float(rest), float(error), difference, off, step or 0.0,
+        float(inner.value), float(inner.error), float(rest), float(error), difference, off, step,
         bool(both.converged and inner.converged), evals,
     )  # fmt: skip
 

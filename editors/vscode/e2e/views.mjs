@@ -15,6 +15,7 @@ export const VIEWS = {
     const frame = frameOf(page);
     await frame.locator('#now svg .surface[data-equation="x = t"]').waitFor({ state: "attached" });
     assert.equal(await frame.locator("#name").inputValue(), "left");
+    await frame.locator("#formulas math").first().waitFor();
     assert.match((await frame.locator("#formulas").innerText()).normalize("NFKC"), /δ/);
     await picture("view");
   },
