@@ -197,7 +197,7 @@ def format_count(number: int, thing: str) -> str:
 
 def computed_by(stats: Mapping[str, Any]) -> str:
     """What came up with the numbers of an evaluation."""
-    points = stats["points by machine code"]
+    points = stats.get("points by machine code", 0)
     return f"{format_count(points, 'point')} by machine code, the rest by numpy" if points else "by numpy"
 
 
