@@ -35,6 +35,7 @@ low = Step(0.25, 3)
 def rise(s: Step) integral [0, 1] (if [x < s.at] then 0 else s.height) d(x)
 #> rise(low)
 def raised(at) rise(low with at = at)
+def total(g: Real* -> Real) integral [0, 1] g(x) d(x)
 def plain(t) t^2
 lost = 1 + nothing
 """
@@ -203,7 +204,8 @@ def test_the_picture_is_xml_with_a_group_for_each_surface() -> None:
 
 @pytest.mark.parametrize(
     ("name", "wrt", "which", "says"),
-    [("plain", "t", 0, "no integral"), ("step", "u", 0, "no number `u`"), ("nobody", "t", 0, "not defined"),
+    [("plain", "t", 0, "no integral"), ("total", "t", 0, "not a function of numbers"),
+     ("step", "u", 0, "no number `u`"), ("nobody", "t", 0, "not defined"),
      ("lost", "t", 0, "nothing"), ("two", "t", 2, "2 integrals")],
 )  # fmt: skip
 def test_what_cannot_be_seen_says_why(name: str, wrt: str, which: int, says: str) -> None:

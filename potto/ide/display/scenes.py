@@ -122,6 +122,8 @@ def scene(db: Database, file: str, name: str) -> Scene | None:
                 _fields(parameter.type),
             )
         )
+    if all(parameter.kind == "function" for parameter in made):
+        return None
     axes = _axes([parameter.name for parameter in made if parameter.kind == "number"])
     return Scene(name, NOWHERE, tuple(made), components, axes)
 
