@@ -160,12 +160,11 @@ def picture(entry: Picture, chapter: Chapter, depth: Depth) -> Checked:
 def scene(entry: Picture, chapter: Chapter) -> tuple[potto.Module, float]:
     """The program at the size of the gallery's pixels, and their side."""
     text = (chapter.folder / f"{entry.program}.po").read_text(encoding="utf-8")
-    (side,) = (number for name, number in entry.set if name == "h")
-    top, _, below = side.partition("/")
-    assert "h = 1 / 256" in text
-    return potto.Workspace(chapter.folder).compile(text.replace("h = 1 / 256", f"h = {side}")), float(top) / float(
-        below
-    )
+    x0, x1 = entry.box[:2]
+    assert entry.pixel == "h" and "h = 1 / 256" in text
+    side = f"h = ({x1} - {x0})/{entry.size[0]}"
+    module = potto.Workspace(chapter.folder).compile(text.replace("h = 1 / 256", side))
+    return module, (x1 - x0) / entry.size[0]
 
 
 def accuracy(entry: Picture) -> dict[str, float]:
