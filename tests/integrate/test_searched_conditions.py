@@ -208,3 +208,13 @@ def test_a_number_that_is_an_integral_is_to_be_a_parameter() -> None:
     with pytest.raises(potto.PottoError, match="no inverse was found") as caught:
         module.f(0.5)
     assert caught.value.diagnostics[0].help == "make `big` a parameter, and give the definition as its argument"
+
+
+@pytest.mark.parametrize("t", [2.0, 3.0])
+def test_metaballs_are_cut_where_their_halves_turn(t: float) -> None:
+    """Of the roots y^2 of a quadratic one is c/q: where c is 0 the section turns, and few nodes do."""
+    f = potto.compile(
+        "def f(t) integral ([-2, 2], [-2, 2]) [1/(0.1 + (x-0.5)^2 + y^2) + 1/(0.1 + (x+0.5)^2 + y^2) > t] d(x, y)"
+    ).f
+    answer = potto.deriv(f)((t, 1.0))
+    assert answer.converged and answer.evals < 3000

@@ -16,7 +16,7 @@ from msgspec.structs import replace
 
 from potto.calculus.algebra.polynomial_in import collect
 from potto.calculus.algebra.radicals import NAN, guarded
-from potto.calculus.algebra.ranges import positive, vanishing
+from potto.calculus.algebra.ranges import positive, range_of, vanishing
 from potto.calculus.algebra.rational_form import settled, shorter
 from potto.calculus.solving.isolate import Guard, Step, Stuck, step
 from potto.calculus.solving.reduce_occurrences import split
@@ -303,16 +303,23 @@ def _turning(roots: Iterable[Term], indices: frozenset[str]) -> tuple[Term, ...]
     found: dict[Term, None] = {}
     for node in postorder(*roots):
         for edge in _edges(node):
-            for term in vanishing(edge):  # the surface and the cases of a branch are looked at on their own
+            for term in vanishing(_mostly(edge)):  # the surface and the cases of a branch are looked at on their own
                 if not isinstance(term, Branch) and not term.free & indices:
                     found.setdefault(neg(term) if neg(term) in found else term)
     return tuple(found)
 
 
+def _mostly(term: Term) -> Term:
+    """The other case of a branch whose surface is nowhere positive: that changes no sides."""
+    if isinstance(term, Branch) and range_of(term.surface).hi <= 0:
+        return term.orelse
+    return term
+
+
 def _edges(node: Term) -> tuple[Term, ...]:
     match node:
         case Branch():
-            return (node.surface,)
+            return () if _mostly(node) is not node else (node.surface,)
         case Prim(op="div", args=(_, below)):
             return () if positive(below) else (below,)
         case Prim(op="pow", args=(base, exponent)):
