@@ -147,3 +147,17 @@ def test_all_of_several_conditions_are_their_product(condition: str) -> None:
     assert abs(answer.value - below**6) <= answer.error + 1e-17 and answer.error <= 1e-13
     assert abs(answer.tangent - 6 * below**5 * (1 - below)) <= answer.tangent_error + 1e-17
     assert answer.tangent_error <= 1e-13 and answer.evals <= 200
+
+
+@pytest.mark.parametrize("condition", ["max({}) < t", "min({}) > t"])
+def test_what_is_elsewhere_than_where_all_conditions_hold_counts(condition: str) -> None:
+    """Half of the density everywhere, and the other half where all of six numbers are below, or above, t."""
+    body = f"(if [{condition.format(', '.join(SIX))}] then 1 else 1/2)*exp({' '.join(f'- {x}' for x in SIX)})"
+    f = potto.compile(f"def f(t) integral ({', '.join(['[0, 1]'] * 6)}) {body} d({', '.join(SIX)})").f
+    with potto.settings(samples=20_000, rtol=1e-3):
+        answer = potto.grad(f, "t")(0.7)
+    below, all_of_it = 1 - mp.exp(-mp.mpf(0.7)), 1 - mp.exp(mp.mpf(-1))
+    part = below if "max" in condition else all_of_it - below
+    assert abs(answer.value - (part**6 + all_of_it**6) / 2) <= answer.error <= 1e-3
+    slope = 3 * part**5 * (1 - below) * (1 if "max" in condition else -1)
+    assert abs(answer.tangent - slope) <= answer.tangent_error <= 0.01

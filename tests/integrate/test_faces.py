@@ -78,3 +78,16 @@ def test_what_crosses_a_face_may_cancel_but_for_its_speed(turn: float) -> None:
     program = f"def f(t) integral ([-1, 1], [-1, 1]) {edges}*[x*sin(t) - y*cos(t) < 1/4]*x*y d(x, y)"
     found = potto.deriv(potto.compile(program).f)((turn, 1.0))
     assert abs(found.tangent - math.cos(2 * turn) / 32) <= found.tangent_error + 1e-16 <= 1e-9
+
+
+@pytest.mark.parametrize("order", ["x, y, z", "y, z, x", "z, x, y"])
+@pytest.mark.parametrize(
+    ("reach", "slope"), [("[0, 1]", 2.0), ("[-0.2, 1]", 2.0), ("[0, t]", 4 * 0.7), ("[0.1, 1]", 1.8)]
+)
+def test_a_face_behind_a_kink_in_one_variable_of_three(order: str, reach: str, slope: float) -> None:
+    """Where z > 0, y < t: of two units of x, as long as z reaches above 0."""
+    bounds = {"x": "[-1, 1]", "y": "[0, 1]", "z": reach}
+    ranges = ", ".join(bounds[name] for name in order.split(", "))
+    program = f"def f(t) integral ({ranges}) [abs(z)*t >= z*y] d({order})"
+    answer = potto.deriv(potto.compile(program).f)((0.7, 1.0))
+    assert abs(answer.tangent - slope) <= answer.tangent_error <= 1e-11 and answer.converged

@@ -141,7 +141,9 @@ def _factors(term: Term) -> Iterable[Term]:
                 waiting += (then, branch(item.coordinates, item.strict, ONE, ZERO))
             case Branch(then=then, orelse=orelse) if then is ZERO and orelse is not ONE:
                 waiting += (orelse, branch(item.coordinates, item.strict, ZERO, ONE))
-            case Branch(then=then) if then is ONE and len(every := _every(item.surface)) > 1:
+            case Branch(then=then, orelse=orelse) if (
+                then is ONE and orelse is ZERO and len(every := _every(item.surface)) > 1
+            ):
                 waiting += (branch((surface,), item.strict, ONE, ZERO) for surface in every)
             case _:
                 yield item

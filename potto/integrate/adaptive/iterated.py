@@ -104,7 +104,20 @@ class Iteration(Struct):
             here, sides = seg.pick(keep), {g: take(m, keep) for g, m in sides.items()}
         moving = cuts.moving and machine.directions > 0
         work = PanelBatch(
-            self, number, level, env, here, sides, machine, moving, batch, root, slack, cuts.conflict, cuts.paired
+            self,
+            number,
+            level,
+            env,
+            here,
+            sides,
+            machine,
+            moving,
+            batch,
+            root,
+            slack,
+            cuts.conflict,
+            cuts.paired,
+            cuts.rested,
         )
         sums = integrated(work)
         if not number and (lost_far_out := sums.undefined(batch)).size:
@@ -138,7 +151,7 @@ class Iteration(Struct):
         sides = {g: take(m, rows) for g, m in work.sides.items()}
         again = integrated(PanelBatch(
             self, work.number, work.level, work.env, seg, sides, work.machine, work.moving, work.batch, work.root,
-            work.slack, work.conflict, work.paired,
+            work.slack, work.conflict, work.paired, work.rested,
         ))  # fmt: skip
         again.e += left_out
         again.et += left_out

@@ -20,7 +20,7 @@ from potto.integrate.adaptive.refinement import Tally, doubtful, filled, missed_
 from potto.integrate.adaptive.reynolds import Totals, sums, totals
 from potto.integrate.adaptive.tails import paced
 from potto.integrate.columns import distinct
-from potto.integrate.degenerate.degeneracies import steps_at_cuts
+from potto.integrate.degenerate.degeneracies import seems_to_step, steps_at_cuts
 from potto.integrate.events import BUDGET_SPENT
 from potto.integrate.panels.panel_batch import PanelBatch
 from potto.integrate.pieces import Ends, Pieces, Sums, all_of
@@ -57,7 +57,7 @@ def integrated(work: PanelBatch) -> Sums:
     if work.last and work.parent.extent is not None:
         size = fresh.size.reshape(work.width, -1, fresh.segment.size)[:, 0].max(axis=0)
         work.parent.extent.saw_values(size / (work.seg.b - work.seg.a), work.below(work.seg.owner))
-    if (work.conflict or work.paired) and not work.last:
+    if not work.last and (work.conflict or work.paired or seems_to_step(work, fresh)):
         work.steps = steps_at_cuts(work, fresh)
     found = totals(work, fresh, ends)
     if good_enough(work, fresh, found, ends):

@@ -50,6 +50,7 @@ class Cuts(Struct):
     conflict: cuts all but at one place move differently: harmless only where the integrand does not jump there.
     paired: cuts at one place, at which it should only bend, move as one: so does a surface that runs along what is
     further in, where it leaves the one bound and the other.
+    rested: cuts move with which no nodes do, since the integrand should be continuous there.
     """
 
     sign: Array
@@ -59,6 +60,7 @@ class Cuts(Struct):
     bound_nan: Bools | None
     conflict: bool = False
     paired: bool = False
+    rested: bool = False
     meetings: list[Meeting] = []
     brushes: list[Edge] = []
     folds: list[Fold] = []
@@ -194,14 +196,15 @@ def on_bounds(
 
 def standing(cuts: Cuts) -> Cuts:
     """The same cuts, none of which moves."""
-    return replace(at_rest(cuts), edges=[], conflict=False, meetings=[], brushes=[], folds=[])
+    return replace(at_rest(cuts), edges=[], conflict=False, rested=False, meetings=[], brushes=[], folds=[])
 
 
 def at_rest(cuts: Cuts) -> Cuts:
     """The same cuts, with which no nodes move; what was found of their motion stays."""
     seg = cuts.segments
+    moved = seg.ta.any() or seg.tb.any()
     seg.ta, seg.tb, seg.da, seg.db = (np.zeros_like(speed) for speed in (seg.ta, seg.tb, seg.da, seg.db))
-    return replace(cuts, moving=False)
+    return replace(cuts, moving=False, rested=bool(moved))
 
 
 def finite_speeds(cuts: Cuts) -> Cuts:

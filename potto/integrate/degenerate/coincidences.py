@@ -119,9 +119,9 @@ class Scene(Struct, frozen=True):
 
     def inside(self, owner: Ints, here: dict[str, Value], sides: dict[int, Mask]) -> tuple[Array, Array]:
         """F at places of some members, on the sides given, and its errors, (m, B): a check, for which nothing moves."""
-        costs, frozen = self.machine.costs, self.machine.with_directions(0)
+        costs, aside = self.machine.costs, self.machine.looking_aside()
         with nullcontext() if costs is None else costs.apart():
-            return self.parent.inside(self.number, here, owner.size, sides, frozen, self.below(owner))
+            return self.parent.inside(self.number, here, owner.size, sides, aside, self.below(owner))
 
     def as_it_falls(self, owner: Ints, x: Array) -> Array:
         """F at x itself, (m, B): a surface that is 0 there is on the side that its comparison says."""

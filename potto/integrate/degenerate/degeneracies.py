@@ -1,8 +1,8 @@
 """Steps where only bends are expected: a surface that runs along a variable further in has no section there.
 
-Owns `steps_at_cuts`, `brush` (at bounds), `beneath` (where another surface is) and `does_jump`. What is further in is
-integrated on both sides of the place. If it jumps, and it is one surface that makes it jump, what crosses that face is
-known (`faces`); else another variable must go innermost.
+Owns `seems_to_step`, `steps_at_cuts`, `brush` (at bounds), `beneath` (where another surface is) and `does_jump`. What
+is further in is integrated on both sides of the place. If it jumps, and it is one surface that makes it jump, what
+crosses that face is known (`faces`); else another variable must go innermost.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from potto.integrate.degenerate.faces import THIN, Place, crossing, running, run
 from potto.integrate.events import Degenerate
 from potto.integrate.panels.panel_batch import PanelBatch
 from potto.integrate.pieces import Crossing, Pieces, take
-from potto.integrate.rules.gauss import EPS
-from potto.integrate.rules.substitution import Segments
+from potto.integrate.rules.gauss import EPS, gauss
+from potto.integrate.rules.substitution import LINEAR, Segments
 from potto.kernels.cells import Array, Bools, Cell, Ints, Mask
 
 # How far beside a place it is looked at (beside a bound twice), and what part may be lost across it.
@@ -45,7 +45,7 @@ def steps_at_cuts(work: PanelBatch, whole: Pieces) -> Crossing | None:
     width = np.minimum((seg.b - seg.a)[right], (seg.b - seg.a)[left])
     scene = Scene(work.parent, work.number, work.level, work.env, {}, work.machine, work.batch, work.root)
     along = running(scene, owner, x, np.maximum(seg.ea[right], x - seg.b[left]))
-    if not work.conflict and not along.any():
+    if not (work.conflict or work.rested or along.any()):
         return None
     beside = [end + sign * part * np.minimum(width, 1e300)
               for part in BESIDE for end, sign in ((x, 1.0), (seg.b[left], -1.0))]  # fmt: skip
@@ -77,6 +77,24 @@ def steps_at_cuts(work: PanelBatch, whole: Pieces) -> Crossing | None:
         for part in (whole.integral, whole.error, whole.floor):
             part.reshape(work.width, -1, seg.a.size)[:, 1:, i + 1 : j] = 0.0
     return found
+
+
+def seems_to_step(work: PanelBatch, whole: Pieces) -> bool:
+    """Whether the integrand may take a step at cuts with which no nodes move, since it is taken to be continuous there:
+    as its polynomials on both sides have it, or because a map of the nodes hides what it is there."""
+    seg = work.seg
+    if not work.rested:
+        return False
+    left, right = _neighbours(seg)
+    assert whole.coefficients is not None
+    values, size = (part[:: part.shape[0] // work.width] for part in (whole.coefficients, whole.size))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ends = values @ gauss(values.shape[-1]).ends / (seg.b - seg.a)[:, None]
+        mean = size / (seg.b - seg.a)
+    before, after = ends[:, left, 1], ends[:, right, 0]
+    steps = np.abs(after - before) > DISCONTINUITY * (mean[:, left] + mean[:, right])
+    mapped = seg.kind != LINEAR
+    return bool((steps | mapped[left] | mapped[right]).any())
 
 
 def _move_as_one(work: PanelBatch, whole: Pieces, left: Ints, right: Ints, jump: Array) -> bool:

@@ -45,6 +45,7 @@ class PanelBatch(Struct, dict=True):
     slack: Array | None = None
     conflict: bool = False
     paired: bool = False
+    rested: bool = False
     width: int = 1
     ends: Ends | None = None
     endless: Array | None = None  # (k, B) the tangents that are infinite, with their signs; 0 for others

@@ -90,6 +90,7 @@ class Machine:
     """One evaluation, carrying `directions` tangents; `rounding` where rounding errors are kept track of.
 
     frozen: surfaces, bounds and deltas stand still, so that tangents are those of the integrands alone.
+    aside: it is looked at places beside those that count: surfaces that are met there say nothing.
     side: -1 or 1 where one-sided derivatives are wanted, for parameters that shrink or grow.
     summed: whether the members of batches are summands, so that nobody sees the digits of each.
     into: the number of the sum into which each member of a batch of integrals goes, if they are nothing but summands;
@@ -106,6 +107,7 @@ class Machine:
     rounding: bool = True
     root: bool = True
     frozen: bool = False
+    aside: bool = False
     side: int = 0
     summed: bool = False
     into: Ints | None = None
@@ -156,6 +158,10 @@ class Machine:
     def standing(self) -> Machine:
         """The machine for which surfaces, bounds and deltas stand still."""
         return self.changed(frozen=True)
+
+    def looking_aside(self) -> Machine:
+        """The machine for a check of places beside those that count, for which nothing moves."""
+        return self.changed(directions=0, taping=False, aside=True)
 
     # Record
 
@@ -320,7 +326,7 @@ class Machine:
     def falls(self, surface: Number, strict: bool) -> tuple[Any, Any]:
         """Which side a surface falls on, and nan wherever it is nan."""
         mask = surface > 0 if strict else surface >= 0
-        met = np.count_nonzero(surface == 0) if self.directions and self.record.second else 0
+        met = np.count_nonzero(surface == 0) if self.directions and self.record.second and not self.aside else 0
         if met and not self.root and STRAY * met < np.size(surface):
             self.note(MEETINGS)  # at single nodes: the apex of a cone
         elif met:
