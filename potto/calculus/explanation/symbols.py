@@ -115,6 +115,8 @@ def without_guards(term: Term) -> Term:
                 return orelse
             case Branch(then=then, orelse=orelse) if orelse is NAN:
                 return then
+            case Branch(surface=Prim(op="neg", args=(Prim(op="abs"),)), strict=False, orelse=orelse):
+                return orelse
             case _:
                 return new
 
