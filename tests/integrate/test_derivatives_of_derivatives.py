@@ -8,6 +8,7 @@ from __future__ import annotations
 import pytest
 
 import potto
+from potto.calculus.solving import pivots
 
 PROGRAMS = {
     # the surface runs along y where x is the larger one, so that no root in y tells of it
@@ -15,6 +16,9 @@ PROGRAMS = {
     # along the other variable a surface is all of an axis
     "product": "integral [0, 1] x*(integral [0, 1] [(x + t - 0.5)*(z + s) > 0] d(z)) d(x)",
     "inner minimum": "integral [0, 1] x*(integral [0, 1] [min(x + t, z) > s] d(z)) d(x)",
+    # all terms have a factor, whose root is not the one that moves
+    "factor": "integral ([0, 1], [0, 1]) [sin(z)*t*s >= sin(z)*y]*exp(y*s) d(y, z)",
+    "factor behind a kink": "integral ([0, 1], [-1, 1], [0.1, 1]) [abs(z)*t*s >= z*y]*exp(y*s) d(y, x, z)",
     # how many roots there are varies with x
     "sine": "integral ([-0.5, 1.5], [-1, 1]) [sin(2*x + y) > t*0.7] d(x, y)",
     "sines": "integral ([-0.5, 1.5], [-1, 1]) sin(3*[sin(2*x + y) <= t*0.7] + x*s) d(x, y)",
@@ -57,11 +61,21 @@ def k(a) integral [0, 1] y*snd(deriv(rows)((y, a))) d(y)
         assert abs(got.value - size * 0.5) <= 1e-13 + got.error and got.error <= 1e-11
 
 
-def test_a_formula_that_misses_a_part_is_found_out() -> None:
+ALONG = "def f(t) integral ([-1, 1], [0, 1]) (y + 2)*[exp((y + t)*z) > 1] d(y, z)"
+
+
+def test_a_surface_along_the_variable_that_it_is_solved_for() -> None:
     """[exp(y*z) > 1] jumps at y = 0 for all z, of which its root in z, log(1)/y, says nothing."""
-    m = potto.compile("def f(t) integral ([-1, 1], [0, 1]) (y + 2)*[exp((y + t)*z) > 1] d(y, z)")
+    got = potto.deriv(potto.deriv(potto.compile(ALONG).f))(((0.03, 1.0), (1.0, 0.0)))
+    assert abs(got.value[1] - 1.97) <= got.error[1] <= 1e-11  # of y + 2 at -t
+    assert abs(got.tangent[1] + 1) <= got.tangent_error[1] <= 1e-11 and got.converged
+
+
+def test_a_formula_that_misses_a_part_is_found_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(pivots, "_is_a_factor", lambda *_: False)
+    m = potto.compile(ALONG.replace("y + 2", "y + 3"))
     got = potto.deriv(potto.deriv(m.f))(((0.03, 1.0), (1.0, 0.0)))
-    assert abs(got.value[1] - 1.97) <= 1e-12  # of y + 2 at -t
+    assert abs(got.value[1] - 2.97) <= 1e-12  # of y + 3 at -t
     assert got.error[1] <= 1e-11 and got.tangent_error[1] == float("inf")
     assert not got.converged and "disagree about the first one" in got.reasons[0]
     short = m.eval("D(D(f))(0.03)")

@@ -14,6 +14,7 @@ from msgspec import Struct
 from potto.calculus.algebra.affine import affine
 from potto.calculus.algebra.ranges import range_of
 from potto.calculus.solving.solve import Family, Sections, sections
+from potto.calculus.surfaces.branch_assignment import unguarded
 from potto.core.terms import Const, Integral, Term, const, if_, prim, substitute
 
 
@@ -74,6 +75,8 @@ def _solved(node: Integral, surface: Term, order: Sequence[str], folding: bool =
         turning = () if folding or not isinstance(found, Sections) else found.turning
         if any(turn.free & frozenset(node.variables) for turn in turning):
             reasons.append(f"it turns back along `{name}`")
+        elif isinstance(found, Sections) and _is_a_factor(node, surface, name, found):
+            reasons.append(f"another part of it may run along `{name}`")
         elif isinstance(found, Sections) and found.complete:
             roots = [Root(name, r) for r in (*found.roots, *found.poles)]
             position = node.variables.index(name)
@@ -81,6 +84,13 @@ def _solved(node: Integral, surface: Term, order: Sequence[str], folding: bool =
         else:
             reasons.append(found.reason)
     raise NoClosedForm(reasons[0] if reasons else "the surface varies with no variable of integration")
+
+
+def _is_a_factor(node: Integral, surface: Term, name: str, found: Sections) -> bool:
+    """Whether a root stands still while other variables vary: then the surface has a factor with this root, and a
+    further one, as of abs(z)*t - z*y; where that does not vary with `name` it has no root in it."""
+    others = surface.free & frozenset(node.variables) - {name}
+    return bool(others) and any(not unguarded(root).free & others for root in found.roots)
 
 
 def chosen(alternatives: Sequence[tuple[Term | None, Term]]) -> Term:

@@ -20,6 +20,8 @@ from potto.calculus.algebra.ranges import positive, range_of, vanishing
 from potto.calculus.algebra.rational_form import settled, shorter
 from potto.calculus.solving.isolate import Guard, Step, Stuck, step
 from potto.calculus.solving.reduce_occurrences import split
+from potto.core.normal_form import as_term, normal_form
+from potto.core.polynomials import shared_by, without
 from potto.core.printer import format_term
 from potto.core.terms import (
     ZERO,
@@ -135,7 +137,7 @@ def sections(surface: Term, name: str) -> Sections | Unsolvable:
 
 
 def factors(surface: Term) -> tuple[Term, ...]:
-    """Terms where a surface changes its sign: of (x - t)/(y - s) both x - t and y - s.
+    """Terms where a surface changes its sign: of (x - t)/(y - s) both x - t and y - s, of z*t - z*y both z and t - y.
 
     Along y the first of them is no root, so whoever looks for roots in one variable after the other asks for each.
     """
@@ -150,11 +152,22 @@ def factors(surface: Term) -> tuple[Term, ...]:
                 waiting.append(inner)
             case Prim(op="pow", args=(base, Const())):
                 waiting.append(base)
+            case Prim(op="add") if common := _shared(item):
+                waiting.extend(reversed(common))
             case _ if item.free and not positive(item):
                 found[item] = None
             case _:
                 pass
     return tuple(found)
+
+
+def _shared(item: Prim) -> tuple[Term, ...]:
+    """The factors that all summands of a sum have in common, and what is left of it; nothing if there are none, or if
+    the sum would have to be multiplied out."""
+    form = normal_form(item)
+    shared = shared_by(list(form)) if len(form) == len(item.args) else {}
+    rest = as_term({without(monomial, shared): c for monomial, c in form.items()}) if shared else None
+    return () if rest is None else (*shared, rest)
 
 
 class _Search:
