@@ -42,6 +42,9 @@ function.
 """
 
 
+LOOPS = ("max", "min")  # are words of the language before `x in`, and in Vim a keyword would win
+
+
 def page() -> str:
     """The text of the page."""
     parts = [INTRODUCTION]
@@ -68,7 +71,8 @@ def grammars() -> dict[Path, str]:
     rules = {
         "vim/syntax/potto.vim": (
             r"(?m)(^syntax keyword pottoBuiltin .*\n)+",
-            lines([*names, "fst", "snd", "print"], "syntax keyword pottoBuiltin ") + "\n",
+            lines([*(n for n in names if n not in LOOPS), "fst", "snd", "print"], "syntax keyword pottoBuiltin ")
+            + "\n",
         ),
         "emacs/potto-mode.el": (
             r"(?<=defconst potto--builtins\n)[^)]*\)",

@@ -17,6 +17,7 @@ diffeo polar(x, y; c) = (x, y)
 h = integral (x ~ normal(0, 1)) x d(x)
 #> cover(0.5)
 #= 0.125
+top = max x in [1, 2] (x) + min(1, 2) + fold s = 0 for i in 1..3 (s + i)
 """
 GROUPS = {
     (1, "from"): "pottoInclude", (2, "def"): "pottoDefine", (2, "cover"): "pottoFunction",
@@ -26,6 +27,7 @@ GROUPS = {
     (3, "deriv"): "pottoCalculus", (4, "diffeo"): "pottoDefine", (5, "inverse"): "pottoDefine",
     (6, "where"): "pottoDefine",
     (7, "normal"): "pottoMeasure", (8, "#>"): "pottoLive", (8, "0.5"): "pottoNumber", (9, "#="): "pottoExpected",
+    (10, "max x"): "pottoRepeat", (10, "min("): "pottoBuiltin", (10, "fold"): "pottoRepeat",
 }  # fmt: skip
 
 

@@ -11,6 +11,7 @@ syntax match pottoNumber "\<\d\+\(\.\(\.\)\@!\d*\)\?\([eE][-+]\?\d\+\)\?"
 
 syntax keyword pottoConditional if then else
 syntax keyword pottoRepeat for sum
+syntax match pottoBuiltin "\<\(max\|min\)\>"
 syntax match pottoRepeat "\<\(product\|min\|max\)\ze\s\+\K\k*\s\+in\>"
 syntax match pottoRepeat "\<fold\ze\(\s\+\K\k*\|\s*([^()]*)\)\s*=[^=]"
 syntax match pottoKeyword "\<with\ze\s\+(\?\K\k*\s*=[^=]"
@@ -30,8 +31,8 @@ syntax match pottoFunction "^\K\k*\ze\s*=\s*\(\\\|λ\|deriv\>\)"
 syntax keyword pottoConstant pi inf
 syntax keyword pottoCalculus deriv delta grad D
 syntax keyword pottoBuiltin abs acos asin atan atan2 besselj0 besselj1 ceil clamp cos cosh cross digamma dot erf erfc
-syntax keyword pottoBuiltin erfinv exp expm1 floor gamma hypot image interp len lgamma load log log1p max min norm pow
-syntax keyword pottoBuiltin sech sign sin sinc sinh sqrt tan tanh trigamma fst snd print
+syntax keyword pottoBuiltin erfinv exp expm1 floor gamma hypot image interp len lgamma load log log1p norm pow sech
+syntax keyword pottoBuiltin sign sin sinc sinh sqrt tan tanh trigamma fst snd print
 syntax match pottoMeasure "\(\~\s*\)\@<=\K\k*"
 syntax keyword pottoType Real Dist Diffeo
 
