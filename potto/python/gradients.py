@@ -37,6 +37,8 @@ from potto.runtime.evaluation.sides import as_a_whole
 # whatever their number, tangents 1.6 at 4 and, where all depends on all, 2.7 at 12 and 4.8 at 64; the first call costs
 # half as much from 8 on (`benchmarks/gradients.py ways`). What integrals carry is the same either way.
 MANY = 12
+# Up to how many are differentiated by again, forward, where parts have two derivatives: a tape tells those of parts.
+SIDES = 200
 NOTHING: Swept = (None, None)
 Names = Sequence[str] | str | None
 
@@ -305,9 +307,12 @@ class _Run:
             moving = {name: with_places(self.given[name], (), seeded) for name in wrt}
             self.whole = True
             try:
-                return self.evaluated(moving, self.machine.taped(), lambda value: swept_back(value, seeds))
+                found = self.evaluated(moving, self.machine.taped(), lambda value: swept_back(value, seeds))
+                if directions > SIDES or not self.machine.record.edges:
+                    return found
             except Untaped:
-                self.machine, self.whole = self._machine(), False
+                pass
+            self.machine, self.whole = self._machine(), False
         numbers = iter(range(directions))
         moving = {name: each_moving(self.given[name], numbers, directions) for name in wrt}
         return self.evaluated(moving, self.machine.with_directions(directions), forward)
