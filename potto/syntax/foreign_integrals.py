@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from potto.diagnostics import Diagnostic, Replacement, Suggestion
-from potto.quick import value
+from potto.quick import quick, value
 from potto.source import Span
 from potto.syntax import kinds
 from potto.syntax.tokens import Token
@@ -207,3 +207,6 @@ def _commas(tokens: Sequence[Token]) -> int:
 
 def _text(text: str, tokens: Sequence[Token]) -> str:
     return text[tokens[0].start : tokens[-1].end]
+
+
+quick(_Bound, _Head)

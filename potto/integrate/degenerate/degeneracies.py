@@ -16,7 +16,7 @@ from potto.integrate.degenerate.faces import THIN, Place, crossing, running, run
 from potto.integrate.events import Degenerate
 from potto.integrate.panels.panel_batch import PanelBatch
 from potto.integrate.pieces import Crossing, Pieces, take
-from potto.integrate.rules.gauss import EPS, gauss
+from potto.integrate.rules.gauss import EPS
 from potto.integrate.rules.substitution import LINEAR, Segments
 from potto.kernels.cells import Array, Bools, Cell, Ints, Mask
 
@@ -83,15 +83,12 @@ def seems_to_step(work: PanelBatch, whole: Pieces) -> bool:
     """Whether the integrand may take a step at cuts with which no nodes move, since it is taken to be continuous there:
     as its polynomials on both sides have it, or because a map of the nodes hides what it is there."""
     seg = work.seg
-    if not work.rested:
+    if not work.rested or work.at_ends is None:
         return False
     left, right = _neighbours(seg)
-    assert whole.coefficients is not None
-    values, size = (part[:: part.shape[0] // work.width] for part in (whole.coefficients, whole.size))
     with np.errstate(divide="ignore", invalid="ignore"):
-        ends = values @ gauss(values.shape[-1]).ends / (seg.b - seg.a)[:, None]
-        mean = size / (seg.b - seg.a)
-    before, after = ends[:, left, 1], ends[:, right, 0]
+        mean = whole.size[:: whole.size.shape[0] // work.width] / (seg.b - seg.a)
+    before, after = work.at_ends[0][:, 1, left], work.at_ends[0][:, 0, right]
     steps = np.abs(after - before) > DISCONTINUITY * (mean[:, left] + mean[:, right])
     mapped = seg.kind != LINEAR
     return bool((steps | mapped[left] | mapped[right]).any())

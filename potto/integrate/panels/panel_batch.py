@@ -152,7 +152,7 @@ class PanelBatch(Struct, dict=True):
         p.floor = 4 * EPS * p.size + (size @ rule.slopes) * shake
         if self.ends is not None and self.last and not self.parent.tracked:
             p.floor += noise(self.ends, self.width, p, seg)
-        if self.both or self.bends:
+        if self.both or self.bends or self.rested:
             if self.at_ends is None:
                 self.at_ends = np.zeros((2, self.width, 2, self.seg.a.size))
             note_ends(self.at_ends, p, seg, coefficients[:: height.shape[0] // self.width], rule)
