@@ -38,7 +38,7 @@ from potto.runtime.evaluation.sides import as_a_whole
 # half as much from 8 on (`benchmarks/gradients.py ways`). What integrals carry is the same either way.
 MANY = 12
 # Up to how many are differentiated by again, forward, where parts have two derivatives: a tape tells those of parts.
-SIDES = 200
+SIDES = 32
 NOTHING: Swept = (None, None)
 Names = Sequence[str] | str | None
 
