@@ -29,7 +29,8 @@ def test_a_few_members_cost_what_their_numbers_do(name: str, count: int) -> None
     f = getattr(M, name)
     c = AT[name] + np.linspace(0.0, 0.1, count)
     for call in (f, potto.grad(f, ["c"])):
-        together, single = call(c=c), [call(c=float(x)) for x in c]
+        with potto.settings(backend="numpy"):  # machine code may be ready in between, and rounds otherwise
+            together, single = call(c=c), [call(c=float(x)) for x in c]
         assert together.evals <= sum(one.evals for one in single)
         values = np.array([one.value for one in single]).T
         assert (np.array(together.value) == values).all()  # the same way, the same digits

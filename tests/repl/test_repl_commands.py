@@ -149,7 +149,7 @@ def test_check_where_numbers_are_small(talk):
 
 
 def test_time_has_the_phases(talk):
-    talk(JUMP)
+    talk("def f(t) integral [0, 1] [1.0173*x < t]*exp(0.0131*x) d(x)")  # no other test has left its kernels in memory
     data = talk.data(":time f(0.3)")
     assert list(data["seconds"]) == ["parse", "check", "compile", "link", "evaluate"]
     assert all(spent >= 0 for spent in data["seconds"].values())
