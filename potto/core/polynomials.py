@@ -149,7 +149,10 @@ def shared_by(monomials: list[Monomial]) -> dict[Term, int]:
 
 def without(monomial: Monomial, shared: Mapping[Term, int]) -> Monomial:
     """A monomial divided by these powers."""
-    return tuple((a, n - shared.get(a, 0)) for a, n in monomial if n > shared.get(a, 0))
+    counts = dict(monomial)
+    for a, n in shared.items():
+        counts[a] = counts.get(a, 0) - n
+    return sorted_monomial({a: n for a, n in counts.items() if n})
 
 
 def sorted_monomial(counts: Mapping[Term, int]) -> Monomial:

@@ -15,12 +15,13 @@ from potto.quick import quick, value
 from potto.source import Span
 from potto.syntax import kinds
 from potto.syntax.chunks import split
+from potto.syntax.consequences import Told, only, without_consequences
 from potto.syntax.engine import Engine
 from potto.syntax.foreign_integrals import foreign_integral
 from potto.syntax.groups import Context
 from potto.syntax.habits import foreign_statement, habit
 from potto.syntax.lexer import MAX_LENGTH, Lexed, lex
-from potto.syntax.messages import Stop, describe
+from potto.syntax.messages import Stop
 from potto.syntax.nesting import MAX_NESTING
 from potto.syntax.nodes import BrokenItem, Definition, ErrorExpr, Expr, Item
 from potto.syntax.repair import Edit, find_repair
@@ -78,8 +79,8 @@ def parse_chunk(text: str, diffeo: bool = False) -> ParsedChunk:
         item, diagnostics = BrokenItem(Span(0, len(text)), None), [foreign]
     elsewhere = foreign_integral(text, lexed.tokens, diagnostics) if diagnostics and foreign is None else None
     if elsewhere is not None:
-        item, diagnostics = None, _only(elsewhere, diagnostics)
-    diagnostics = _without_consequences(diagnostics)
+        item, diagnostics = None, only(elsewhere, diagnostics)
+    diagnostics = without_consequences(diagnostics)
     if item is None:
         item = _salvage(text, lexed.tokens, diffeo)
     return ParsedChunk(item, _sorted(diagnostics), comments)
@@ -96,26 +97,8 @@ def parse_expression(text: str) -> ParsedExpression:
         expr, diagnostics = _bounded(_parse(lexed, text, "expression"))
     elsewhere = foreign_integral(text, lexed.tokens, diagnostics) if diagnostics else None
     if elsewhere is not None:
-        expr, diagnostics = None, _only(elsewhere, diagnostics)
-    return ParsedExpression(expr if expr is not None else broken, _sorted(_without_consequences(diagnostics)))
-
-
-def _only(said: Diagnostic, found: list[Diagnostic]) -> list[Diagnostic]:
-    """A message that says all of what follows, and those ahead of it."""
-    return [*(d for d in found if d.span.end <= said.span.start), said]
-
-
-def _without_consequences(found: list[Diagnostic]) -> list[Diagnostic]:
-    """Where one closing bracket closes nothing, its partner may be missing: what was said of the text before it is
-    about what that leaves behind. Bounds are counted where nothing else is wrong with them or with the integrand."""
-    bounds = [d for d in found if d.code == kinds.BOUNDS.code and d.related]
-    others = [d.span.start for d in found if d not in bounds]
-    doubtful = [d for d in bounds if any(d.related[0].span.start <= at < d.span.end for at in others)]
-    found = [d for d in found if d not in doubtful]
-    stray = [d for d in found if d.code == kinds.BRACKETS.code and not d.related]
-    if len(stray) != 1:
-        return found
-    return [d for d in found if d.span.start >= stray[0].span.start]
+        expr, diagnostics = None, only(elsewhere, diagnostics)
+    return ParsedExpression(expr if expr is not None else broken, _sorted(without_consequences(diagnostics)))
 
 
 def completeness(text: str, diffeo: bool = False) -> Literal["complete", "incomplete", "wrong"]:
@@ -157,47 +140,30 @@ def _too_long(text: str) -> Diagnostic:
     return kinds.TOO_DEEP(place, message, help="is this a Potto program? If so, cut it into several definitions")
 
 
-def _guessed(found: list[Diagnostic], text: str) -> int:
-    """Where a bracket opens that is never closed. Its end is guessed, and what the grammar says of the rest is about
-    the guess."""
-    return min([d.span.start for d in found if d.code == kinds.BRACKETS.code and d.related], default=len(text))
-
-
 def _sorted(diagnostics: list[Diagnostic]) -> tuple[Diagnostic, ...]:
     return tuple(sorted(diagnostics, key=lambda diagnostic: diagnostic.span.start))
 
 
 def _parse(lexed: Lexed, text: str, start: str, diffeo: bool = False) -> _Parse:
     """Run the automaton to the end, repairing as it goes; None as value if it had to give up."""
-    tokens, found = lexed.tokens, list(lexed.diagnostics)
+    tokens, told = lexed.tokens, Told(lexed.diagnostics, len(text))
     engine = Engine(Context(text, diffeo), start)
     index = engine.run(tokens, 0)
     first_stop: Stop | None = None
-    stops: list[Diagnostic] = []
-    guessed = _guessed(found, text)
     for _ in range(MOST_ERRORS):
         if index >= len(tokens):
-            causes = [d for d in engine.context.diagnostics if d.span.end <= guessed]
-            found += stops + _causes(causes, found + stops)
-            return _Parse(engine.result, tokens, found, first_stop, stops)
+            return _Parse(engine.result, tokens, told.and_of_trees(engine.context.diagnostics), first_stop, told.stops)
         stop, engine, edits = _stopped(engine, tokens, index, Context(text, diffeo))
         first_stop = first_stop or stop
-        if not stop.at.text:
-            found = _without_doubled(found, stop)
         foreign = habit(stop)
         if foreign is not None:
-            told = [foreign] if stop.place.start <= guessed else []
-            found = [d for d in found if d.code != kinds.NO_DIFFERENTIAL.code or d.span.start != foreign.span.start]
-            return _Parse(None, tokens, [*found, *stops, *told], first_stop, stops)
-        if stop.place.start <= guessed and not _explained(stop, found):
-            said = describe(stop, edits or [])
-            if not any(_says_it(told, said) for told in found + stops):
-                stops.append(said)
+            return _Parse(None, tokens, told.and_foreign(foreign, stop), first_stop, told.stops)
+        told.stopped(stop, edits or [])
         if edits is None:
             break
         tokens = _patched(tokens, stop.index, edits)
         index = engine.run(tokens, stop.index)
-    return _Parse(None, tokens, found + stops, first_stop, stops)
+    return _Parse(None, tokens, told.all, first_stop, told.stops)
 
 
 def _stopped(
@@ -222,36 +188,6 @@ def _stopped(
     context.diagnostics.clear()
     before.run(tokens[: index - 1], 0)
     return behind, before, edits
-
-
-def _explained(stop: Stop, found: list[Diagnostic]) -> bool:
-    """Whether a character that Potto does not know stands where the parse stopped: its message is enough."""
-    start = stop.before.end if stop.before is not None else 0
-    end = stop.at.start if not stop.ended else None
-    unknown = kinds.UNKNOWN_CHARACTER.code
-    return any(d.code == unknown and d.span.start >= start and (end is None or d.span.end <= end) for d in found)
-
-
-def _without_doubled(found: list[Diagnostic], stop: Stop) -> list[Diagnostic]:
-    """Where an integral breaks off, that its `d(...)` is missing too is no news."""
-    at = stop.at.start
-    code = kinds.NO_DIFFERENTIAL.code
-    return [d for d in found if d.code != code or all(related.span.start != at for related in d.related)]
-
-
-def _says_it(told: Diagnostic, said: Diagnostic) -> bool:
-    """Whether a message says already what is wrong: an `integral` alone, or a `sum` that misses two of its parts."""
-    if told.code != kinds.UNFINISHED.code:
-        return False
-    return told.span == said.span or (told.code == said.code and bool(told.related) and told.related == said.related)
-
-
-def _causes(found: list[Diagnostic], stops: list[Diagnostic]) -> list[Diagnostic]:
-    """A line that is no result because it was not understood has its message already; so has what is not a name, or no
-    head of a definition."""
-    codes = (kinds.LAST_LINE.code, kinds.NOT_A_NAME.code, kinds.DEFINITION_HEAD.code)
-    places = [stop.span for stop in stops]
-    return [d for d in found if d.code not in codes or not any(d.span.start <= p.start < d.span.end for p in places)]
 
 
 def _patched(tokens: list[Token], index: int, edits: list[Edit]) -> list[Token]:

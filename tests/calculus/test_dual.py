@@ -73,6 +73,9 @@ CLOSED_FORMS = [
     ("integral(H(p - x*cos(w) - y*sin(w)), (x, 0, 1), (y, 0, 1))", "w", {"w": 0, "p": 0.5}, -0.5, 1e-6),
     # a factor that is no root of the other variable
     ("integral(H((x - t)*(y - s)), (x, 0, 1), (y, 0, 1))", "t", {"t": 0.3, "s": 0.2}, -0.6, 1e-6),
+    # summands with a factor in common, of which one is divided
+    ("integral(H(s - s*x/t)*x, (x, 0, 1))", "t", {"t": 0.3, "s": 0.4}, 0.3, 1e-12),
+    ("integral(H(s - s*x/t)*x, (x, 0, 1))", "t", {"t": 0.3, "s": -0.4}, -0.3, 1e-12),
     # bounds that depend on variables further out
     ("integral(H(t - x - y), (x, 0, 1), (y, 0, x))", "t", {"t": 0.8}, 0.4, 1e-6),
     # an inner integral, used nonlinearly

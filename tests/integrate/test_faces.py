@@ -91,3 +91,15 @@ def test_a_face_behind_a_kink_in_one_variable_of_three(order: str, reach: str, s
     program = f"def f(t) integral ({ranges}) [abs(z)*t >= z*y] d({order})"
     answer = potto.deriv(potto.compile(program).f)((0.7, 1.0))
     assert abs(answer.tangent - slope) <= answer.tangent_error <= 1e-11 and answer.converged
+
+
+@pytest.mark.parametrize("x", ["x", "x^2", "x^3", "x/t"])
+@pytest.mark.parametrize("condition", ["[X*t > X*y] then 0 else 1", "[X*t <= X*y] then 1 else 0"])
+def test_a_face_along_an_infinite_range(x: str, condition: str) -> None:
+    """Where y > t, whatever x > 0 is. That the surface has x as a factor is seen in its summands; no bound tells it."""
+    condition = condition.replace("X", x)
+    program = f"def f(t) integral [-1, 1] (integral [0, inf] exp(-x)*(if {condition}) d(x)) d(y)"
+    with potto.settings(max_evals=200_000):  # too few to try the other order
+        answer = potto.deriv(potto.compile(program).f)((0.5, 1.0))
+    assert abs(answer.value - 0.5) <= answer.error <= 1e-10
+    assert abs(answer.tangent + 1) <= answer.tangent_error <= 1e-10

@@ -15,7 +15,7 @@ from msgspec.structs import replace
 from potto.calculus.algebra.radicals import minus
 from potto.calculus.algebra.ranges import positive
 from potto.calculus.solving.enclosable import slope_of
-from potto.calculus.solving.solve import Family, Sections, Unsolvable, sections
+from potto.calculus.solving.solve import Family, Sections, Unsolvable, sections, shared_factors
 from potto.core.simplify import normalized_surface
 from potto.core.terms import ONE, Const, Prim, Term, prim
 
@@ -140,7 +140,8 @@ def _product(terms: tuple[Term, ...]) -> Term:
 
 
 def factored(surface: Term, orientation: int) -> tuple[tuple[Face, ...], int]:
-    """The factors of a surface written as a product, and the sign of its canonical form against theirs.
+    """The factors of a surface written as a product, or whose summands have factors in common, and the sign of its
+    canonical form against theirs.
 
     A surface that is none, or in which a factor comes twice, is its own and only factor.
     """
@@ -156,6 +157,8 @@ def factored(surface: Term, orientation: int) -> tuple[tuple[Face, ...], int]:
                 waiting.append(inner)
             case Const(value=value):
                 sign = -sign if value < 0 else sign
+            case Prim(op="add") if common := shared_factors(item):
+                waiting.extend(common)
             case _ if positive(item):
                 pass
             case _:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from fractions import Fraction
+from functools import lru_cache
 
 from msgspec import Struct
 from msgspec.structs import replace
@@ -21,9 +22,10 @@ from potto.calculus.algebra.rational_form import settled, shorter
 from potto.calculus.solving.isolate import Guard, Step, Stuck, step
 from potto.calculus.solving.reduce_occurrences import split
 from potto.core.normal_form import as_term, normal_form
-from potto.core.polynomials import shared_by, without
+from potto.core.polynomials import monomial_term, shared_by, without
 from potto.core.printer import format_term
 from potto.core.terms import (
+    ONE,
     ZERO,
     Branch,
     Const,
@@ -152,7 +154,7 @@ def factors(surface: Term) -> tuple[Term, ...]:
                 waiting.append(inner)
             case Prim(op="pow", args=(base, Const())):
                 waiting.append(base)
-            case Prim(op="add") if common := _shared(item):
+            case Prim(op="add") if common := shared_factors(item):
                 waiting.extend(reversed(common))
             case _ if item.free and not positive(item):
                 found[item] = None
@@ -161,13 +163,14 @@ def factors(surface: Term) -> tuple[Term, ...]:
     return tuple(found)
 
 
-def _shared(item: Prim) -> tuple[Term, ...]:
+@lru_cache(maxsize=8192)
+def shared_factors(item: Prim) -> tuple[Term, ...]:
     """The factors that all summands of a sum have in common, and what is left of it; nothing if there are none, or if
     the sum would have to be multiplied out."""
     form = normal_form(item)
     shared = shared_by(list(form)) if len(form) == len(item.args) else {}
     rest = as_term({without(monomial, shared): c for monomial, c in form.items()}) if shared else None
-    return () if rest is None else (*shared, rest)
+    return () if rest is None else (*(monomial_term(ONE, (pair,)) for pair in shared.items()), rest)
 
 
 class _Search:
