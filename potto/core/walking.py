@@ -216,10 +216,10 @@ class Holding:
 
     def __init__(self, *kinds: type[Term]) -> None:
         self.kinds = kinds
-        self.known: dict[Term, bool] = {}
+        self.known: Kept[bool] = Kept(65536)
 
     def __call__(self, term: Term) -> bool:
-        known = self.known
+        known = self.known.table()
         for node in unknown(term, known):
             known[node] = isinstance(node, self.kinds) or any(known[c] for c in children(node))
         return known[term]

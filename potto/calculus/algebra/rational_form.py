@@ -89,11 +89,15 @@ def normal(term: Term, name: str | None = None) -> Rational | None:
     name: sums that do not vary with this variable are atoms: few monomials, which tell less.
     """
     known = _FOUND.setdefault(name, Kept()).table()
-    for node in unknown(term, known, lambda node: _summed(node, name)):
+    order = unknown(term, known, lambda node: _summed(node, name))
+    if any(known.get(part, term) is None for node in order for part in _summed(node, name)):
+        order, known[term] = [], None
+    for node in order:
         try:
             known[node] = _node(node, [_small(known[part]) for part in _summed(node, name)])
         except TooLarge:
-            known[node] = None
+            known[node] = known[term] = None  # and so is all that it is a part of: the rest needn't be multiplied out
+            break
     return known[term]
 
 

@@ -32,6 +32,7 @@ from potto.core.terms import (
     postorder,
     postorder_by,
 )  # fmt: skip
+from potto.core.walking import Holding
 
 
 class Side(Struct, frozen=True):
@@ -129,7 +130,12 @@ def integrating(term: Prim) -> frozenset[Term]:
     return found if len(found) > 1 else frozenset()
 
 
+_holds_integral = Holding(Integral)
+
+
 def _integrates(term: Term) -> bool:
+    if not _holds_integral(term):
+        return False
     kinds = {type(node) for node in outside(term, (Integral, Lam, Deriv))}
     return Integral in kinds and kinds.isdisjoint((App, Branch, If, Sum))
 

@@ -20,7 +20,7 @@ from msgspec import Struct
 
 from potto.calculus.algebra.point_values import sample_value
 from potto.calculus.inlining.deciding import deciding
-from potto.core.packing import keep, packed, recall, unpacked
+from potto.core.packing import keep, keeping, packed, recall, unpacked
 from potto.core.terms import Deriv, Integral, Lam, Term, Var, deriv, substitute, var
 from potto.diagnostics import PottoError
 from potto.integrate.elimination.recursion import Eliminated, eliminated
@@ -190,9 +190,10 @@ class Problem:
             plan = make(self.term, self.function, self.decided, self.plain_function, _Sampled(self))
         known.append(plan)
         # Each as it was made: evaluation adds to what a plan knows, in forms that are for this process alone.
-        with suppress(TypeError):  # what is no data is not kept
-            self.known.packed.append(packed(plan))
-            keep("plans", self.known.key, self.known.packed)
+        if keeping():
+            with suppress(TypeError):  # what is no data is not kept
+                self.known.packed.append(packed(plan))
+                keep("plans", self.known.key, self.known.packed)
         fits = self.fitting(plan)
         if self.batch > 1 and not fits.all():  # to rounding it holds for the one that it was made for
             raise Mixed(fits)
