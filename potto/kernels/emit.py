@@ -75,6 +75,11 @@ def second_partial(op: str, arity: int, i: int, j: int) -> Term:
     return partial(first[i], names[j])
 
 
+@lru_cache(maxsize=4096)
+def _parts(term: Term) -> tuple[Term, ...]:
+    return tuple(postorder(term))
+
+
 class Lines:
     """Generated lines in order, with fresh names and the numpy functions that they use.
 
@@ -285,7 +290,7 @@ class Lines:
         along: the direction, and the side, by which it is told where what is 0 lies.
         """
         rounding, self.rounding = self.rounding, False
-        for node in postorder(term):
+        for node in _parts(term):
             if node in memo:
                 continue
             match node:

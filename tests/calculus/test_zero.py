@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from potto.calculus.algebra.point_values import not_zero
 from potto.calculus.algebra.rational_form import is_zero
 from potto.core.terms import ONE, PI, Term, add, app, const, div, global_, mul, pow_, prim, sub, var
 
@@ -47,3 +48,12 @@ def test_zero(term: Term) -> None:
 )
 def test_not_zero(term: Term) -> None:
     assert not is_zero(term)
+
+
+def test_doubles_tell_nested_roots_apart() -> None:
+    def nested(inside: Term) -> Term:
+        return prim("sqrt", pow_(inside, const(2 / 3)))
+
+    square = add(mul(x, x), ONE)
+    assert not_zero(sub(nested(square), nested(add(square, const(1e-7)))))
+    assert not not_zero(sub(nested(square), pow_(square, const(1 / 3))))

@@ -27,9 +27,11 @@ def sample_value(term: Term, point: Mapping[str, float], known: dict[Term, float
 
 _UNIT = 2.0**-53
 # How much larger than its error a value is that is told from 0; how much a builtin enlarges relative errors, at most
-# (near a zero of its own, where a random point seldom is, it would be more).
+# (near a zero of its own, where a random point seldom is, it would be more). A power enlarges them by its exponent, as
+# long as they are small.
 _CLEAR = 1e3
 _AMPLIFIED = 1e4
+_SMALL = 1e-3
 _MOST_VALUES = 1 << 16
 _TRIES = 8  # points that are tried until a term has a value at one
 _values: list[dict[Term, tuple[float, float]]] = [{} for _ in range(_TRIES)]
@@ -87,8 +89,19 @@ def _of_builtin(node: Prim, known: Mapping[Term, tuple[float, float]]) -> tuple[
             error = (errors[0] + abs(value) * errors[1]) / (abs(values[1]) - errors[1])
         case _:
             relative = max((e / abs(v) if v else math.inf for v, e in zip(values, errors, strict=True)), default=0.0)
-            error = abs(value) * _AMPLIFIED * (relative + _UNIT)
+            error = abs(value) * _enlarged(node, relative) * (relative + _UNIT)
     return value, error + _UNIT * abs(value)
+
+
+def _enlarged(node: Prim, relative: float) -> float:
+    """How much a builtin enlarges relative errors."""
+    match node:
+        case Prim(op="sqrt") if relative < _SMALL:
+            return 1.0
+        case Prim(op="pow", args=(_, Const(value=exponent))) if relative * abs(exponent) < _SMALL:
+            return 1.0 + abs(exponent)
+        case _:
+            return _AMPLIFIED
 
 
 def points(

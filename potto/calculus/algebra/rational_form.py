@@ -17,7 +17,7 @@ from msgspec import Struct
 
 from potto.calculus.algebra.point_values import not_zero
 from potto.core import polynomials
-from potto.core.kinds import union_of
+from potto.core.kinds import App, Array, Deriv, Fold, Index, Integral, Lam, Length, ListOf, Sum, Tuple, union_of
 from potto.core.normal_form import as_term as ordered
 from potto.core.normal_form import normal_form
 from potto.core.polynomials import (
@@ -35,34 +35,8 @@ from potto.core.polynomials import (
     total,
     without,
 )
-from potto.core.terms import (
-    App,
-    Array,
-    Const,
-    Deriv,
-    Fold,
-    Index,
-    Integral,
-    Lam,
-    Length,
-    ListOf,
-    Prim,
-    Sum,
-    Term,
-    Tuple,
-    Var,
-    add,
-    children,
-    div,
-    mul,
-    neg,
-    postorder,
-    postorder_by,
-    prim,
-    rebuild,
-    unknown,
-)
-from potto.core.walking import Kept
+from potto.core.terms import Const, Prim, Term, Var, add, children, div, mul, neg, postorder, prim, rebuild, unknown
+from potto.core.walking import Holding, Kept
 
 _LARGEST = 128  # monomials
 
@@ -135,7 +109,7 @@ def settled(term: Term, names: frozenset[str]) -> Term:
 def _settled(term: Term, name: str) -> Term:
     memo: dict[Term, Term] = {}
     rational: dict[Term, bool] = {}
-    for node in postorder_by(term, lambda node: children(node) if name in node.free else ()):
+    for node in postorder(term, below=lambda node: children(node) if name in node.free else ()):
         parts = children(node) if name in node.free else ()
         rational[node] = not parts or (_is_rational(node) and all(rational[part] for part in parts))
         new = rebuild(node, tuple(memo[part] for part in parts)) if parts else node
@@ -169,7 +143,7 @@ def _without_it(term: Term, name: str) -> Term:
 
 
 # Equal ones are told by their normal forms.
-_OPAQUE = (App, Array, Deriv, Fold, Index, Integral, Lam, Length, ListOf, Sum, Tuple)
+_holds_opaque = Holding(App, Array, Deriv, Fold, Index, Integral, Lam, Length, ListOf, Sum, Tuple)
 
 
 @lru_cache(maxsize=8192)
@@ -179,7 +153,7 @@ def is_zero(term: Term) -> bool:
     A value at one point in doubles says no to nearly all that are not; then the normal form says yes, or sample points
     do, to 50 digits, where an identity is needed that it does not know.
     """
-    if any(isinstance(node, _OPAQUE) for node in postorder(term)):
+    if _holds_opaque(term):
         term = ordered(normal_form(term)) or term
     if isinstance(term, Const):
         return term.value == 0

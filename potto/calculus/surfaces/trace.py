@@ -29,7 +29,6 @@ from potto.core.terms import (
     function_of,
     lam,
     outside,
-    postorder,
     postorder_by,
 )  # fmt: skip
 from potto.core.walking import Holding
@@ -84,14 +83,16 @@ def spine(call: App) -> tuple[Term, tuple[tuple[Term, ...], ...]]:
 HEAVY = (Integral, Sum, Fold, Array, Index)
 
 
-@lru_cache(maxsize=65536)
+_holds_heavy, _holds_call = Holding(*HEAVY), Holding(App, Hole)
+
+
 def is_heavy(term: Term, calls: bool) -> bool:
     """Whether a side of a conditional is worth evaluating only where it is taken.
 
     Integrals, sums and what reads arrays are; calls and holes are too (`calls`) under a plain condition, which may be
     what ends a recursion, or says that a measure is none.
     """
-    return any(isinstance(t, HEAVY) or (calls and isinstance(t, App | Hole)) for t in postorder(term))
+    return _holds_heavy(term) or (calls and _holds_call(term))
 
 
 def is_lazy(term: If | Branch) -> bool:
