@@ -1,18 +1,24 @@
 """lsprotocol's classes, made when they are first looked at. Owns `load`.
 
 `lsprotocol.types` has 554 classes, for each of which attrs writes and compiles methods when the module is imported:
-four fifths of what importing pygls takes. The server needs a handful of them. While that one module is imported, attrs'
-`define` is one that waits until a class is called or asked for its fields, and is then carried out as it stands.
+nine tenths of what importing pygls takes. The server needs a handful of them. While that one module is imported, the
+bodies of its classes wait, and so does attrs' `define`, until a class is called or asked for its fields; both are then
+carried out as they stand.
 """
 
 from __future__ import annotations
 
+import builtins
 import sys
 from collections.abc import Callable
+from importlib.util import find_spec, module_from_spec
 from threading import RLock
+from types import CodeType, FunctionType
 from typing import Any
 
+NAME = "lsprotocol.types"
 _lock = RLock()
+_bodies: dict[type, FunctionType] = {}  # of classes that are still empty
 
 
 class _Fields:
@@ -45,6 +51,7 @@ def _later(define: Callable[..., Any]) -> Callable[..., Any]:
                     if vars(cls).get("__init__") is init:
                         del cls.__init__
                     del cls.__attrs_attrs__
+                    _fill(cls)
                     define(cls, **{**how, "slots": False})
 
         def init(self: Any, *given: Any, **named: Any) -> None:
@@ -59,15 +66,43 @@ def _later(define: Callable[..., Any]) -> Callable[..., Any]:
     return defined
 
 
+def _empty(body: FunctionType, name: str, *bases: type, **how: Any) -> type:
+    """A class whose body waits, if there is nothing but fields in it."""
+    if bases or how or any(isinstance(constant, CodeType) for constant in body.__code__.co_consts):
+        return builtins.__build_class__(body, name, *bases, **how)
+    made = type(name, (), {"__module__": NAME, "__qualname__": name})
+    _bodies[made] = body
+    return made
+
+
+def _fill(cls: type) -> None:
+    """Carry out the body of a class, if that is still to be done."""
+    body = _bodies.pop(cls, None)
+    if body is not None:
+        for name, value in vars(builtins.__build_class__(body, cls.__name__)).items():
+            if name not in ("__dict__", "__weakref__", "__module__"):
+                setattr(cls, name, value)
+
+
 def load() -> None:
     """Import `lsprotocol.types`, unless that was done already."""
-    if "lsprotocol.types" in sys.modules:
+    if NAME in sys.modules:
         return
     import attrs
 
+    spec = find_spec(NAME)
+    assert spec is not None and spec.loader is not None, "lsprotocol comes with pygls"
+    module = sys.modules[NAME] = module_from_spec(spec)
+    vars(module)["__builtins__"] = {**vars(builtins), "__build_class__": _empty}
     define = attrs.define
     attrs.define = _later(define)
     try:
-        import lsprotocol.types  # noqa: F401
+        spec.loader.exec_module(module)
+    except BaseException:
+        del sys.modules[NAME]
+        raise
     finally:
         attrs.define = define
+    setattr(sys.modules["lsprotocol"], "types", module)  # noqa: B010  # as an import does
+    for cls in [cls for cls in _bodies if "__attrs_attrs__" not in vars(cls)]:  # that attrs is not told of
+        _fill(cls)

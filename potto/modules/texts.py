@@ -160,10 +160,10 @@ def parsed(db: Database, text: str, diffeo: bool) -> ParsedChunk:
 
 @query(keep=4096)
 def head(db: Database, text: str, diffeo: bool) -> Head:
-    """What a chunk is and what it names. Small, so that more of them are kept than of trees; mostly without a tree."""
-    defined = defined_name(text)
-    if defined is not None:
-        return Head("definition", *defined)
+    """What a chunk is and what it names. Small, so that more of them are kept than of trees."""
+    described = _described(text)
+    if described is not None:
+        return described
     item = parsed(db, text, diffeo).item
     match item:
         case None:
@@ -176,6 +176,12 @@ def head(db: Database, text: str, diffeo: bool) -> Head:
             return Head("broken", item.name, item.span)
         case _:
             return Head("statement")
+
+
+def _described(text: str) -> Head | None:
+    """What a chunk is if its first line says so, as mostly: that takes no tree, and no longer than to look it up."""
+    defined = defined_name(text)
+    return None if defined is None else Head("definition", *defined)
 
 
 @query(keep=2048)
@@ -204,7 +210,7 @@ def piece(db: Database, text: str, diffeo: bool) -> Piece:
     statements: list[ChunkRef] = []
     found = split(text)
     for chunk in found:
-        described = head(db, chunk.text, diffeo)
+        described = _described(chunk.text) or head(db, chunk.text, diffeo)
         if described.name is not None and described.name_span is not None:
             name = described.name
             texts[name] = chunk.text
