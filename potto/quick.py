@@ -2,8 +2,8 @@
 
 Owns `value`, for classes that would be frozen dataclasses with slots: it makes them without generating text, in a
 twentieth of the time, which counts at every start, and their constructors take half as long, since they write through
-the descriptors of the slots. Where the front end is machine code they are dataclasses, which the compiler knows
-(`hatch_build.py`). Elsewhere values are structs of msgspec, which it does not.
+the descriptors of the slots. Where the front end is machine code the compiler takes them for dataclasses
+(`hatch_build.py`), and `machine` gives them the rest. Elsewhere values are structs of msgspec, which it does not know.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import copyreg
 from collections.abc import Callable
 from functools import cache
 from operator import attrgetter
-from typing import Any, TypeVar, dataclass_transform
+from typing import TYPE_CHECKING, Any, TypeVar, dataclass_transform
 
 _T = TypeVar("_T")
 
@@ -28,10 +28,8 @@ def value(cls: type[_T]) -> type[_T]:
     defaults = tuple(own.pop(name) for name in names if name in own)
     for name in ("__dict__", "__weakref__"):
         own.pop(name, None)
-    get = attrgetter(*names) if len(names) > 1 else _single(attrgetter(*names)) if names else lambda _: ()
-    shared = {"__eq__": _eq(get), "__hash__": _hash(get), "__repr__": _repr(names), "__reduce__": _reduce(get)}
-    frozen = {"__setattr__": _refuse, "__delattr__": _refuse, "__slots__": names, "__match_args__": names}
-    made: Any = type(cls.__name__, (), {**shared, **frozen, **own})
+    shared = {**_shared(names), "__reduce__": _reduce(_getter(names)), "__slots__": names}
+    made: Any = type(cls.__name__, (), {**shared, **own})
     init = _template(len(names))(*(vars(made)[name].__set__ for name in names))
     init.__code__ = init.__code__.replace(co_varnames=("self", *names))
     init.__defaults__ = defaults
@@ -39,6 +37,25 @@ def value(cls: type[_T]) -> type[_T]:
     made.__init__ = init
     made.__qualname__ = cls.__qualname__
     return made  # type: ignore[no-any-return]
+
+
+if TYPE_CHECKING:
+    from dataclasses import dataclass as machine
+else:
+
+    def machine(*, init: bool = True, **_: bool) -> Callable[[type[_T]], type[_T]]:
+        """In the place of `dataclass`, which the compiler takes it for: for values whose fields and constructor are
+        machine code."""
+
+        def given(cls: type[_T]) -> type[_T]:
+            names = tuple(vars(cls).get("__annotations__", ()))
+            assert not (init and names), "the constructor is written out"
+            for name, shared in _shared(names).items():
+                if name not in vars(cls):
+                    setattr(cls, name, shared)
+            return cls
+
+        return given
 
 
 def replace(value: _T, /, **changes: Any) -> _T:
@@ -74,6 +91,18 @@ def _template(count: int) -> Callable[..., Any]:
     made: dict[str, Any] = {}
     exec(f"def make({', '.join(writers)}):\n def __init__({head}): {body}\n return __init__", made)
     return made["make"]  # type: ignore[no-any-return]
+
+
+def _shared(names: tuple[str, ...]) -> dict[str, Any]:
+    """What all values of some fields have."""
+    get = _getter(names)
+    frozen = {"__setattr__": _refuse, "__delattr__": _refuse, "__match_args__": names}
+    return {"__eq__": _eq(get), "__hash__": _hash(get), "__repr__": _repr(names), **frozen}
+
+
+def _getter(names: tuple[str, ...]) -> Callable[[Any], Any]:
+    """Gives the fields of a value."""
+    return attrgetter(*names) if len(names) > 1 else _single(attrgetter(*names)) if names else lambda _: ()
 
 
 def _single(get: Callable[[Any], Any]) -> Callable[[Any], tuple[Any, ...]]:

@@ -67,15 +67,18 @@ def test_constructors_are_written_out_and_no_line_moves(hook: types.ModuleType) 
     assert changed == [
         ("@dataclass(frozen=True, slots=True)", "@dataclass(init=False, frozen=True, slots=True)"),
         ("", "    def __init__(self, x: int, y: str = 'a') -> None: self.x = x; self.y = y  # type: ignore"),
-        ("@value", "@dataclass(init=False, frozen=True, slots=True)"),
+        ("@value", "@machine(init=False, frozen=True, slots=True)"),
         ("", "    def __init__(self, x: int) -> None: self.x = x  # type: ignore"),
     ]
 
 
 def test_what_is_written_out_makes_the_same_values(hook: types.ModuleType, tmp_path: Path) -> None:
     """As Python that is not frozen, which is how machine code writes into fields."""
-    head = "from __future__ import annotations\nfrom dataclasses import dataclass, field\n"
-    written = head + hook.with_inits(TEXT).replace("frozen=True, ", "")
+    head = (
+        "from __future__ import annotations\nfrom dataclasses import dataclass, field\nfrom potto.quick import value\n"
+    )
+    written = hook.with_inits(head + TEXT).replace("(init=False, frozen=True, ", "(init=False, ")
     check = "assert Plain(2).both() == 'aa' and Plain(x=1, y='b') == Plain(1, 'b')"
+    check += "; assert repr(Valued) != repr(Plain) and Valued.__match_args__ == ('x',)"
     (tmp_path / "one.py").write_text(f"{written}\n{check}\n")
     assert subprocess.run([sys.executable, "one.py"], cwd=tmp_path, check=False).returncode == 0

@@ -69,7 +69,8 @@ def _later(define: Callable[..., Any]) -> Callable[..., Any]:
 def _empty(body: FunctionType, name: str, *bases: type, **how: Any) -> type:
     """A class whose body waits, if there is nothing but fields in it."""
     if bases or how or any(isinstance(constant, CodeType) for constant in body.__code__.co_consts):
-        return builtins.__build_class__(body, name, *bases, **how)
+        made: type = builtins.__build_class__(body, name, *bases, **how)
+        return made
     made = type(name, (), {"__module__": NAME, "__qualname__": name})
     _bodies[made] = body
     return made

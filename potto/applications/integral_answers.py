@@ -15,6 +15,7 @@ import msgspec
 
 from potto.applications.integral_pictures import integral_svg, remarks, told
 from potto.applications.integral_scenes import IntegralScene, Shot
+from potto.applications.integral_views import FRAME
 from potto.calculus.explanation.layout import DerivativeText
 from potto.diagnostics import PottoError
 from potto.evaluating.world import World
@@ -25,7 +26,6 @@ from potto.modules import chunk_start
 from potto.projects.settings import settings
 from potto.syntax.typesetting import mathml
 
-FRAME = 0.016  # seconds
 QUICK = 1e-4  # the accuracy of what is seen while a slider is dragged: less than a pixel
 MOST = 400  # characters of a formula that is shown
 

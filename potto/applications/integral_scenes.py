@@ -5,13 +5,14 @@ Owns `IntegralScene`, which the command, the page in a browser and editors share
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Mapping
 
 from msgspec import Struct
 
 from potto.applications.integral_pictures import integral_svg, words
-from potto.applications.integral_views import IntegralNumbers, IntegralView, Viewer, numbers
+from potto.applications.integral_views import FRAME, IntegralNumbers, IntegralView, Viewer, numbers
 from potto.checking.regions import Region, regions
 from potto.core.terms import ZERO, Lam, Term, app, lam, tuple_, var
 from potto.diagnostics import PottoError
@@ -25,6 +26,7 @@ from potto.types import groups_of, interface
 
 UNSAID = 0.5  # what a number is that nobody gives
 PATIENCE = 0.1  # seconds: numbers that take longer wait until nothing is dragged any more, and the picture goes on
+AGAIN = 0.25  # seconds between numbers that do not fit into a frame
 
 
 class Shot(Struct, frozen=True):
@@ -71,6 +73,7 @@ class IntegralScene:
         self._regions: dict[str, tuple[Region, ...]] = {}
         self._viewers: dict[tuple[str, int], Viewer] = {}
         self._took: dict[tuple[str, int], float] = {}  # seconds that numbers took last
+        self._told: dict[tuple[str, int], float] = {}  # when that was
         self._functions: dict[Lam, TermFunction] = {}
 
     def _arguments(self, found: Scene, given: Mapping[str, str]) -> list[Term]:
@@ -146,20 +149,22 @@ class IntegralScene:
         quick: bool = False,
     ) -> Shot:  # fmt: skip
         """The integral number `which`, from 0, with these values; `ghost`: the step of what is seen of differences,
-        `nodes`: also where it was evaluated. A `quick` one is coarser, and without numbers where these took too long
-        the last time. Raises PottoError where it has no value."""
+        `nodes`: also where it was evaluated. A `quick` one is coarser, and mostly without numbers where these do not
+        fit into a frame. Raises PottoError where it has no value."""
         known = self.regions(wrt)
         if not 0 <= which < len(known):
             raise wrong_call(f"`{self.name}` has {len(known)} integrals", f"choose one from 1 to {len(known)}")
         key = wrt, which
         viewer = self._viewers.setdefault(key, Viewer(known[which], self._compiled))
+        begun = time.perf_counter()
         seen = viewer.look(values, wrt, ghost or 0.0, nodes, quick)
-        found = None
-        if not quick or self._took.get(key, 0.0) <= PATIENCE:
-            start = time.perf_counter()
+        found, start = None, time.perf_counter()
+        took, since = self._took.get(key, 0.0), start - self._told.get(key, -math.inf)
+        if not quick or took <= FRAME - (start - begun) or (took <= PATIENCE and since > AGAIN):
             found = numbers(known[which], self._compiled, values, wrt, ghost, quick)
+            self._told[key] = time.perf_counter()
             if quick:
-                self._took[key] = time.perf_counter() - start
+                self._took[key] = self._told[key] - start
         title = f"{self.name}({', '.join(f'{name} = {value:.4g}' for name, value in values.items())})"
         return Shot(seen, found, title, wrt)
 

@@ -7,6 +7,8 @@ is the integral along them; of more variables the first two are seen, the others
 
 from __future__ import annotations
 
+import math
+import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -22,7 +24,9 @@ from potto.runtime.answers.estimate import Estimate
 from potto.runtime.evaluation.machine import WATCHING
 
 PLACES = 257  # along a curve
-SIDE, QUICK_SIDE = 97, 49  # along a side of a square; while something is dragged
+SIDE = 97  # along a side of a square
+QUICK_SIDE, COARSEST = 49, 17  # while something is dragged: as many as fit into a frame
+FRAME = 0.016  # seconds
 REACH = 6.0  # how far an endless range is drawn
 ARROWS = 24  # of one surface, at most
 NODES = 1500
@@ -132,15 +136,17 @@ class Viewer:
         self.region = region
         self._compiled = compile
         self.seen = region.variables[:2]
+        self._quick_side = QUICK_SIDE
 
     def look(
         self, given: Mapping[str, float], wrt: str = "", ghost: float = 0.0, nodes: bool = False, quick: bool = False
     ) -> IntegralView:
         """The view with these parameters; with ghosts for steps of `wrt`, and nodes, if they are wanted; a `quick` one
-        is coarser. Raises PottoError where the integrand has no value."""
+        is as coarse as a frame asks for. Raises PottoError where the integrand has no value."""
+        start = time.perf_counter()
         places: dict[str, Any] = {**given, **dict.fromkeys(self.region.variables, 0.0)}
         box, held, cut = self._ranges(places)
-        count = PLACES if len(box) == 1 else QUICK_SIDE if quick else SIDE
+        count = PLACES if len(box) == 1 else self._quick_side if quick else SIDE
         grids = [np.linspace(low, high, count) for low, high in box]
         at = {**places, **self._mesh(grids)}
         inside = self._inside(at)
@@ -155,12 +161,20 @@ class Viewer:
             self._surface(surface, level, grids, places)
             for surface, level in zip(self.region.surfaces, levels, strict=True)
         )
-        return IntegralView(
+        view = IntegralView(
             self.seen, tuple(box), _rows(np.where(inside, values, np.nan)), _rows(cells), surfaces,
             self._bounds(places, box), tuple(held), cut,
             self._ghosts(places, grids, wrt, ghost) if ghost else ((), ()),
             self._nodes(given, box) if nodes else (),
         )  # fmt: skip
+        if quick:
+            self._fit(time.perf_counter() - start)
+        return view
+
+    def _fit(self, seconds: float) -> None:
+        """Make the next quick view of as many places as fit into three quarters of a frame; the rest is drawing."""
+        side = self._quick_side * math.sqrt(0.75 * FRAME / seconds)
+        self._quick_side = int(min(max(side, COARSEST), QUICK_SIDE))
 
     def _ghosts(
         self, places: Mapping[str, Any], grids: Sequence[Array], wrt: str, step: float

@@ -96,7 +96,8 @@ def is_translation(path: str) -> bool:
     """Whether a file is one of gettext's, as its first entry tells."""
     try:
         with open(path, "rb") as file:
-            return _TRANSLATION.search(file.read(SNIFFED)) is not None
+            start = file.read(SNIFFED)
+            return b"msg" in start and _TRANSLATION.search(start) is not None
     except OSError:
         return False
 

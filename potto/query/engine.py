@@ -304,13 +304,14 @@ class Engine:
 
     def _depend(self, memo: Memo, frame: dict[Node, None]) -> None:
         """Record what a memo depends on. One that reads no input stands forever."""
-        durability = DURABILITIES
+        durability, kept = DURABILITIES, list[Node]()
         for dep in frame:
-            if dep.durability < durability:
-                durability = dep.durability
-        memo.durability = durability
-        memo.deps = tuple([dep for dep in frame if dep.durability < DURABILITIES])
-        memo.leaves = leaves_of(memo.deps)
+            level = dep.durability
+            if level < DURABILITIES:
+                kept.append(dep)
+                durability = min(durability, level)
+        memo.durability, memo.deps = durability, tuple(kept)
+        memo.leaves = () if durability else leaves_of(memo.deps)
         memo.verified_at = self.revision if durability < DURABILITIES else FOREVER
 
     def _fail(self, memo: Memo, frame: dict[Node, None], mark: int, fresh: bool, failed: bool) -> None:

@@ -179,10 +179,15 @@ def test_what_another_module_keeps_to_itself_is_looked_at(tmp_path: Path) -> Non
 
 
 def test_where_numbers_take_too_long_the_picture_goes_on_without(monkeypatch: pytest.MonkeyPatch) -> None:
+    """For a while without those that don't fit into a frame; without those that nobody would wait for at all."""
     world = World()
     scene = IntegralScene(world, world.put("program.po", PROGRAM), "disc", {})
-    for patience, quick, known in ((0.0, True, True), (0.0, True, False), (10.0, True, True), (0.0, False, True)):
+    cases = ((0.0, 9.0, True, True), (0.0, 9.0, True, False), (10.0, 9.0, True, False), (10.0, 0.0, True, True),
+             (0.0, 0.0, True, False), (0.0, 9.0, False, True))  # fmt: skip
+    monkeypatch.setattr(integral_scenes, "FRAME", 0.0)
+    for patience, again, quick, known in cases:
         monkeypatch.setattr(integral_scenes, "PATIENCE", patience)
+        monkeypatch.setattr(integral_scenes, "AGAIN", again)
         shot = scene.look({"r": 0.7}, "r", quick=quick)
         assert (shot.numbers is not None) == known
         assert shot.view.surfaces[0].gain == pytest.approx(2 * math.pi * 0.7, rel=1e-2)

@@ -54,7 +54,8 @@ async function look() {
     if (opening === begun) {
       say(found.error ?? "");
       if (!found.error) {
-        last = { ...found, title: titleOf(name, body.values), wrt, body };
+        const kept = !found.numbers && last?.body.name === name && last.wrt === wrt && last.body.which === which;
+        last = { ...found, ...(kept && { told: last.told, numbers: last.numbers, old: true }), title: titleOf(name, body.values), wrt, body };
         show($("now"), last, pinned);
         tell(found, performance.now() - since);
       }
@@ -89,7 +90,7 @@ const titleOf = (name, values) =>
 const say = (text) => { $("said").textContent = text; };
 function tell(found, whole) {
   const time = $("time");
-  time.textContent = `${(found.seconds * 1000).toFixed(1)} ms${found.slow ? ", more than a frame" : ""}${found.numbers ? "" : ", numbers when you let go"}`;
+  time.textContent = `${(found.seconds * 1000).toFixed(1)} ms${found.slow ? ", more than a frame" : ""}${found.numbers ? "" : ", numbers follow"}`;
   time.title = `${whole.toFixed(1)} ms until it was drawn`;
   time.classList.toggle("slow", found.slow);
   time.dataset.frames = String(1 + Number(time.dataset.frames ?? 0));
@@ -105,7 +106,7 @@ function show(figure, shot, beside) {
       row.append(make("td", { className: "changed", textContent: difference(shot, beside, place), title: "less the pinned one" }));
     return row;
   });
-  const table = make("table", { className: "numbers" }, ...rows);
+  const table = make("table", { className: shot.old ? "numbers old" : "numbers" }, ...rows);
   const picture = make("div");
   picture.innerHTML = shot.svg;
   const list = make("ul", { className: "list" }, ...shot.surfaces.map(surfaceName), ...shot.remarks.map((text) => make("li", { textContent: text })));
