@@ -182,7 +182,7 @@ def _live(world: World, task: Mapping[str, Any]) -> dict[str, Any]:
         found["holds"] = agrees(estimate, wanted, world.parse(expected))
         if not found["holds"]:
             message = f"this is {found['shown']}, not {expected}"
-            help = "put right the program, or what it is expected to give"
+            help = "correct the program, or the expected value"
             whole = Span(0, len(expected))
             failed = DOES_NOT_HOLD(whole, message, help=help)
             said.append(Located("<expected>", failed))

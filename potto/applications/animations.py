@@ -93,7 +93,7 @@ def _channels(packed: Any) -> Any:
 def _save_mp4(path: str, frames: Any, grid: Grid, rate: float) -> None:
     program = ffmpeg()
     if program is None:
-        raise OSError("there is no ffmpeg any more")
+        raise OSError("ffmpeg is gone")
     even = "pad=ceil(iw/2)*2:ceil(ih/2)*2"  # what players want
     words = [program, "-y", "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s",
              f"{grid.width}x{grid.height}", "-r", f"{rate:g}", "-i", "-", "-vf", even, "-pix_fmt", "yuv420p",

@@ -129,4 +129,7 @@ def _parts(found: DerivativeText) -> list[tuple[int, str, str]]:
 
 
 def _surfaces(shot: Shot) -> list[dict[str, Any]]:
-    return [{"equation": s.equation, "inside": bool(s.lines), "gain": s.gain} for s in shot.view.surfaces]
+    return [
+        {"equation": s.equation, "condition": s.condition, "inside": bool(s.lines), "gain": s.gain}
+        for s in shot.view.surfaces
+    ]

@@ -1,9 +1,9 @@
 """An integral as SVG: the domain and its cells, surfaces, arrows for what the boundary gains, and the numbers.
 
-Owns `integral_svg`, `words` and `told`. Every surface is a group with its number as `data-surface` and its equation as
-`data-equation`, so that a page can tell which one was clicked. Arrows point to where a place moves; they are as long as
-what it gains is great, blue where the integral gains and red where it loses. Colours are those of classes, which a page
-may set; a picture that stands alone brings its own.
+Owns `integral_svg`, `words` and `told`. Every surface is a group with its number as `data-surface` and the equation of
+its condition as `data-equation`, so that a page can tell which one was clicked. Arrows point to where a place moves;
+they are as long as what it gains is great, blue where the integral gains and red where it loses. Colours are those of
+classes, which a page may set; a picture that stands alone brings its own.
 """
 
 from __future__ import annotations
@@ -69,8 +69,8 @@ def integral_svg(view: IntegralView, said: Sequence[Said] = (), dark: bool = Fal
     parts += _nodes(view, frame)
     largest = max((abs(a.weight) for a in _arrows(view)), default=0.0)
     for number, surface in enumerate(view.surfaces):
-        name = html.escape(surface.equation, quote=True)
-        parts.append(f'<g class="surface" data-surface="{number}" data-equation="{name}"><title>{name}</title>')
+        name, condition = (html.escape(text, quote=True) for text in (surface.equation, surface.condition))
+        parts.append(f'<g class="surface" data-surface="{number}" data-equation="{condition}"><title>{name}</title>')
         path = _path(surface.lines, frame, flat)
         parts += [f'<path class="grip" d="{path}" fill="none" stroke="transparent" stroke-width="12"/>',
                   f'<path class="edge" d="{path}" fill="none" stroke-width="2"/>'] if path else []  # fmt: skip

@@ -65,6 +65,7 @@ class IntegralScene:
             raise wrong_call(f"`{name}` has no parameter `{unknown[0]}`",
                              f"its parameters are {', '.join(p.name for p in found.parameters)}")  # fmt: skip
         self.values: dict[str, float] = {}
+        self._parts: dict[str, str] = {}  # what the program calls the numbers of a tuple or a record
         arguments = iter(self._arguments(found, given))
         call = core(world.db, target.file, target.name).term
         for group in groups_of(interface(world.db, target.file, target.name).type):
@@ -93,6 +94,7 @@ class IntegralScene:
             names = [parameter.name, *(f"{parameter.name}.{field}" for field in parameter.fields)]
             if parameter.kind != "number":
                 names = names[1:] or [f"{parameter.name}_{n + 1}" for n in range(parameter.size)]
+                self._parts |= {name: f"{parameter.name}.{n}" for n, name in enumerate(names)}
             self.values.update(zip(names, numbers, strict=True))
             terms.append(var(names[0]) if parameter.kind == "number" else tuple_(map(var, names)))
         return terms
@@ -155,7 +157,7 @@ class IntegralScene:
         if not 0 <= which < len(known):
             raise wrong_call(f"`{self.name}` has {len(known)} integrals", f"choose one from 1 to {len(known)}")
         key = wrt, which
-        viewer = self._viewers.setdefault(key, Viewer(known[which], self._compiled))
+        viewer = self._viewers.setdefault(key, Viewer(known[which], self._compiled, self._parts))
         begun = time.perf_counter()
         seen = viewer.look(values, wrt, ghost or 0.0, nodes, quick)
         found, start = None, time.perf_counter()

@@ -8,6 +8,7 @@ is the integral along them; of more variables the first two are seen, the others
 from __future__ import annotations
 
 import math
+import re
 import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
@@ -34,6 +35,7 @@ STEP = 1e-3  # of the parameter, or of 1 where that is more
 TINY = 1e-13
 PARTS, CLOSER = 64, 10  # a root is looked for in so many parts, so often: its ends are neighbours then
 
+_NAME = re.compile(r"[^\W\d]\w*(?:\.\w+)*")
 Compile = Callable[[Lam], TermFunction]
 Point = tuple[float, ...]
 Line = tuple[Point, Point]
@@ -51,12 +53,14 @@ class Arrow(Struct, frozen=True):
 
 
 class SurfaceView(Struct, frozen=True):
-    """A surface inside of the domain. lines: from and to, in one variable the same point twice."""
+    """A surface inside of the domain. lines: from and to, in one variable the same point twice. condition: its equation
+    as the program tells it, where parts of a parameter have no names of their own."""
 
     equation: str
     lines: tuple[Line, ...]
     arrows: tuple[Arrow, ...]
     gain: float  # what all of it adds to the derivative, as far as that is seen
+    condition: str
 
 
 class IntegralView(Struct, frozen=True):
@@ -130,10 +134,12 @@ def numbers(
 
 
 class Viewer:
-    """Looks at one integral. compile: makes a function of numbers and arrays of a term of the region."""
+    """Looks at one integral. compile: makes a function of numbers and arrays of a term of the region. parts: the names
+    of parts of parameters, and what the program calls these."""
 
-    def __init__(self, region: Region, compile: Compile) -> None:
+    def __init__(self, region: Region, compile: Compile, parts: Mapping[str, str] | None = None) -> None:
         self.region = region
+        self._written = {**{name: name.rstrip("_") for name in region.variables}, **(parts or {})}
         self._compiled = compile
         self.seen = region.variables[:2]
         self._quick_side = QUICK_SIDE
@@ -276,7 +282,7 @@ class Viewer:
     ) -> SurfaceView:
         ends = self._roots(surface, level, grids[0], places) if len(grids) == 1 else zero_lines(level, *grids)
         if not len(ends):
-            return SurfaceView(surface.equation, (), (), 0.0)
+            return SurfaceView(surface.equation, (), (), 0.0, self._condition(surface))
         middles = ends.mean(axis=1)
         at = {**places, **dict(zip(self.seen, middles.T, strict=True))}
         keep = self._inside(at)
@@ -297,7 +303,11 @@ class Viewer:
         order = np.argsort(np.arctan2(around[:, -1], around[:, 0]), kind="stable")
         shown = chosen[order][:: max(1, -(-len(chosen) // ARROWS))]
         arrows = () if surface.jump is None else _arrows(middles[shown], velocities[shown], weights[shown])
-        return SurfaceView(surface.equation, lines, arrows, float(np.sum(weights * lengths)))
+        gain = float(np.sum(weights * lengths))
+        return SurfaceView(surface.equation, lines, arrows, gain, self._condition(surface))
+
+    def _condition(self, surface: RegionSurface) -> str:
+        return _NAME.sub(lambda name: self._written.get(name[0], name[0]), surface.equation)
 
     def _roots(self, surface: RegionSurface, level: Array, xs: Array, places: Mapping[str, Any]) -> Array:
         """The points of a surface on a line: (n, 2, 1), each twice."""

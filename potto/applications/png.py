@@ -13,7 +13,7 @@ def encode(rgb: bytes, width: int, height: int, quick: bool = False) -> bytes:
     """Pixels row by row from the top, three or four bytes each, as a PNG file; `quick`: larger, in less time."""
     channels, rest = divmod(len(rgb), max(width * height, 1))
     if rest or channels not in (3, 4):
-        raise ValueError(f"{len(rgb)} bytes are no {width} x {height} pixels")
+        raise ValueError(f"{len(rgb)} bytes are not {width} x {height} pixels")
     stride = channels * width
     raw = b"".join(b"\x00" + rgb[i * stride : (i + 1) * stride] for i in range(height))
     head = struct.pack(">IIBBBBB", width, height, 8, 2 if channels == 3 else 6, 0, 0, 0)

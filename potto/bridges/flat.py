@@ -58,7 +58,7 @@ class Flat:
         self.wrt = self.names if wrt is None else parameters_to_vary(function, wrt)
         for name in self.wrt:
             if name not in self.names:
-                raise wrong_call(f"`{name}` is given, so that nothing can be differentiated by it")
+                raise wrong_call(f"`{name}` is given, so nothing can be differentiated by it")
         leaves = [leaf for p in self.parameters for leaf in _leaves(p.name or "", (), p.type)]
         self.moving = tuple(leaf for leaf in leaves if leaf.parameter in self.wrt)
         self.still = tuple(leaf for leaf in leaves if leaf.parameter not in self.wrt)

@@ -113,7 +113,7 @@ def _rules(flat: Flat, jax: Any) -> Callable[[Sizes, Any, Any], Any]:
         return (value, off, slope), (along(slope, tangents[0]), jax.numpy.zeros_like(off), turned)
 
     def of_curvatures(sizes: Sizes, at: Any, tangents: Any) -> Any:
-        raise wrong_call("a function of Potto has first and second derivatives in JAX, and no third ones")
+        raise wrong_call("a function of Potto has first and second derivatives in JAX, but no third ones")
 
     values.defjvp(of_values)
     slopes.defjvp(of_slopes)

@@ -143,11 +143,11 @@ def _functions(torch: Any) -> Callable[..., Any]:
 
         @staticmethod
         def backward(ctx: Any, *cotangents: Any) -> Any:
-            raise wrong_call("a function of Potto has first and second derivatives in PyTorch, and no third ones")
+            raise wrong_call("a function of Potto has first and second derivatives in PyTorch, but no third ones")
 
         @staticmethod
         def jvp(ctx: Any, *tangents: Any) -> Any:
-            raise wrong_call("a function of Potto has first and second derivatives in PyTorch, and no third ones")
+            raise wrong_call("a function of Potto has first and second derivatives in PyTorch, but no third ones")
 
         @staticmethod
         def vmap(info: Any, dims: Any, *args: Any) -> Any:

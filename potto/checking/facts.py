@@ -167,7 +167,7 @@ def _unless_recursive(db: Database, target: Global) -> Term | None:
 
 
 def _integral_facts(found: IntegralText) -> PartFacts:
-    reason = f"the boundary is found by numbers: {found.reason}" if found.reason else ""
+    reason = f"the boundary is found numerically: {found.reason}" if found.reason else ""
     deltas = tuple(map(found.over, found.deltas))
     return PartFacts(found.over(found.integrand), found.over(found.interior) if found.interior else "", deltas,
                      found.bounds, reason, found.continuous, found.each)  # fmt: skip

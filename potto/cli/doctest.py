@@ -20,7 +20,7 @@ EXAMPLE = "  potto test examples/"
 def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("paths", nargs="+", metavar="PATH", help="files, or folders to walk; `-` is standard input")
     add_set(parser)
-    parser.add_argument("-v", "--verbose", action="store_true", help="show what passes as well")
+    parser.add_argument("-v", "--verbose", action="store_true", help="also show what passes")
 
 
 def run(options: argparse.Namespace, console: Console) -> int:

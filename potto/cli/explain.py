@@ -29,7 +29,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     missing = [code for code in wanted if code not in {page.code for page in found}]
     for code in missing:
         near = difflib.get_close_matches(code, pages.codes(), 3)
-        hint = f"; near ones: {', '.join(near)}" if near else "; `potto explain` lists them all"
+        hint = f"; similar codes: {', '.join(near)}" if near else "; `potto explain` lists them all"
         console.complain(f"potto explain: there is no diagnostic {code}{hint}")
     if options.json:
         console.answer_json({"pages": [_page_json(page) for page in found]})

@@ -12,7 +12,7 @@ EXAMPLE = "  potto replay session.log"
 
 def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("paths", nargs="+", metavar="FILE", help="what `:record` wrote; `-` is standard input")
-    parser.add_argument("-v", "--verbose", action="store_true", help="show what stayed as well")
+    parser.add_argument("-v", "--verbose", action="store_true", help="also show what stayed")
 
 
 def run(options: argparse.Namespace, console: Console) -> int:

@@ -26,7 +26,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
                         "derivative depends)")  # fmt: skip
     parser.add_argument("--integral", metavar="N", type=_count, default=1, help="which one of several (default 1)")
     parser.add_argument("-o", "--output", metavar="FILE", help="write a picture, .svg (else: a page in the browser)")
-    parser.add_argument("--no-open", action="store_true", help="say the address of the page, open no browser")
+    parser.add_argument("--no-open", action="store_true", help="print the address of the page, and open no browser")
     add_set(parser)
     add_options(parser)
 

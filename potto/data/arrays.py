@@ -80,7 +80,7 @@ def _entries(content: bytes, read: Callable[[ZipFile, ZipInfo], _T]) -> Iterator
         archive = zipfile.ZipFile(io.BytesIO(content))
         entries = archive.infolist()
     except broken as error:
-        raise malformed(f"the file is no NPZ file: {_said(error)}", hint=_SAVE_MANY) from None
+        raise malformed(f"the file is not an NPZ file: {_said(error)}", hint=_SAVE_MANY) from None
     if not entries:
         raise malformed("the file holds no arrays", hint=_SAVE_MANY)
     for entry in entries:
@@ -117,7 +117,7 @@ def _checked(content: bytes, length: int) -> _Head:
         message = f"the file ends too early: it has {length} bytes where its head promises {head.end}"
         raise malformed(message, hint="write the file again")
     if len(head.dimensions) > DEEPEST:
-        raise malformed(f"the array has {len(head.dimensions)} dimensions; there may be {DEEPEST}")
+        raise malformed(f"the array has {len(head.dimensions)} dimensions; the most is {DEEPEST}")
     if 0 in head.dimensions:
         raise malformed(f"the array holds no values: its shape is {head.dimensions}")
     return head
@@ -129,7 +129,7 @@ def _head(content: bytes) -> _Head:
     if content.startswith(_PICKLE):
         raise _pickled()
     if not content.startswith(_MAGIC) or len(content) < 12:
-        raise malformed("the file is no NPY file: it does not start as one", hint=_SAVE)
+        raise malformed("the file is not an NPY file: it does not start like one", hint=_SAVE)
     if content[6] not in (1, 2, 3):
         raise malformed(f"the file is of version {content[6]} of NPY, which is not known", hint=_SAVE)
     wide = 2 if content[6] == 1 else 4

@@ -33,7 +33,7 @@ def nested(text: str) -> Value:
     except json.JSONDecodeError as error:
         if not text.strip():
             raise malformed("the file holds no values", hint="JSON is a number, a list or an object") from None
-        message = f"line {error.lineno} is no JSON: {error.msg[:1].lower()}{error.msg[1:]}"
+        message = f"line {error.lineno} is not JSON: {error.msg[:1].lower()}{error.msg[1:]}"
         raise malformed(message, row=error.lineno) from None
     except RecursionError:
         raise malformed(_DEEP) from None

@@ -65,7 +65,7 @@ def _head(content: bytes) -> _Head:
     elif content.startswith(_JPEG):
         head = _jpeg(content)
     else:
-        raise malformed("the file is neither PNG nor JPEG: it does not start as one", hint=_AGAIN)
+        raise malformed("the file is neither PNG nor JPEG: it does not start like one", hint=_AGAIN)
     if not head.height or not head.width:
         raise malformed(f"the picture has no pixels: it is {head.width} x {head.height}", hint=_AGAIN)
     return head

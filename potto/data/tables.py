@@ -221,7 +221,7 @@ def _careful(lines: Sequence[str], layout: _Layout, texts: frozenset[int]) -> li
 def _ragged(layout: _Layout, row: int, length: int) -> Refused:
     names = f"the header has {counted(layout.width, 'name')}"
     usual = names if layout.names else f"line {layout.origin} has {layout.width}"
-    hint = "every row has one value for each column; what separates them was told by the first lines"
+    hint = "every row has one value for each column; the separator was read off the first lines"
     if layout.delimiter == ",":
         hint = "every row has one value for each column; if commas are decimal points here, separate values by `;`"
     expected = counted(layout.width, "value")

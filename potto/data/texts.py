@@ -16,13 +16,13 @@ from potto.data.mistakes import malformed
 _WIDE = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 # What may stand in a name: superscripts are letters to `\w`, but exponents to a program.
 _ODD = re.compile(r"[\W²³¹⁰⁴-⁹]")
-_UTF8 = "save it again as a text in UTF-8"
+_UTF8 = "save it again as UTF-8 text"
 
 
 def text_of(content: bytes) -> str:
     """The text of a file, without a byte order mark, its lines ending with LF."""
     if content.startswith(_WIDE):
-        raise malformed("this is a text in UTF-16, not in UTF-8", hint=_UTF8)
+        raise malformed("this is UTF-16 text, not UTF-8", hint=_UTF8)
     if b"\0" in content:
         row = content.count(b"\n", 0, content.index(b"\0")) + 1
         raise malformed(f"line {row} holds a NUL byte: this is not text", row=row, hint=_UTF8)
@@ -31,7 +31,7 @@ def text_of(content: bytes) -> str:
     except UnicodeDecodeError as error:
         at = error.start + (3 if content.startswith(codecs.BOM_UTF8) else 0)
         row, byte = content.count(b"\n", 0, at) + 1, f"{content[at]:#04x}"
-        message = f"line {row} is not text in UTF-8: it holds the byte {byte}"
+        message = f"line {row} is not UTF-8 text: it holds the byte {byte}"
         raise malformed(message, row=row, found=byte, hint=_UTF8) from None
     return text.replace("\r\n", "\n").replace("\r", "\n") if "\r" in text else text
 

@@ -42,7 +42,7 @@ from potto.types.types import TupleOf
 @rule(nodes.Integral)
 def _integral(elaboration: Elaboration, node: nodes.Integral, scope: Scope) -> Value:
     if len(node.bounds) != len(node.variables) or not node.variables:
-        return hole("this integral has not as many bounds as variables of integration")
+        return hole("this integral does not have as many bounds as variables of integration")
     names: list[str] = []
     choices: list[tuple[Part, ...]] = []  # of each variable, what its measure is the sum of
     for bound, variable in zip(node.bounds, node.variables):

@@ -20,7 +20,7 @@ from potto.runtime.answers.printing import holds, written_tolerance
 from potto.runtime.answers.shown import format_answer, interval
 from potto.syntax import live_expressions, nodes
 
-DOES_NOT_HOLD = declare("P0530", "a live expression that does not give what is written behind it")
+DOES_NOT_HOLD = declare("P0530", "a live expression that does not give what is written below it")
 
 
 class Outcome(Struct, frozen=True):

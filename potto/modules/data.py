@@ -35,7 +35,7 @@ def data_file(db: Database, file: str, written: str) -> DataFile | DataMistake:
     """What a file of data holds, or what is wrong with it."""
     path = path_of(file, written)
     found: DataFile | DataMistake | None = db.get_input(("data", path))
-    return found if found is not None else DataMistake(UNREADABLE, "this program can read no files", hint=_NO_FILES)
+    return found if found is not None else DataMistake(UNREADABLE, "this program cannot read files", hint=_NO_FILES)
 
 
 quick(DataFile)

@@ -161,7 +161,10 @@ def _not_in_module(
     message = f"the module `{item.module}` has no `{imported.name}`"
     label = "not defined there"
     if isinstance(meaning(db, last.file, last.name), Imported):
-        message, label = f"`{imported.name}` cannot be had from the module `{item.module}`", "its import there fails"
+        message, label = (
+            f"`{imported.name}` cannot be imported from the module `{item.module}`",
+            "its import there fails",
+        )
     elif len(search.steps) > 1:
         message = f"{message}: it is to come from `{_stem(last.file)}`, which does not define `{last.name}`"
     helps = [did_you_mean(near)] if near else []

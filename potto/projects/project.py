@@ -37,7 +37,7 @@ LINTS = (
     "P0406", "P0501", "P0522", "P0524", "P0610", "P0611", "P0612", "P0613", "P0614", "P0615", "P0616", "P0620", "P0621",
     "P0622", "P0623", "P0624", "P0625",
 )  # fmt: skip
-BAD_PROJECT = declare("P0231", "a project file that says what is not understood")
+BAD_PROJECT = declare("P0231", "a project file that is not understood")
 
 _SEVERITIES: Mapping[str, Severity] = {"error": "error", "warning": "warning", "info": "info", "hint": "hint"}
 
@@ -114,7 +114,7 @@ def _parsed(folder: str, data: bytes) -> Project:
         text = data.decode("utf-8")
         table = tomllib.loads(text)
     except UnicodeDecodeError:
-        return Project(folder, (folder,), problems=(_unreadable("this is not a text in UTF-8"),))
+        return Project(folder, (folder,), problems=(_unreadable("this is not UTF-8 text"),))
     except tomllib.TOMLDecodeError as error:
         message, place = mistake_at(text, str(error))
         return Project(folder, (folder,), problems=(BAD_PROJECT(place, message),), text=text)
@@ -178,7 +178,7 @@ class _Reader:
 
     def _no_lint(self, code: str) -> None:
         if code in codes():
-            told = f"`lints`: {code} is not a lint, its severity cannot be changed; lints are {_listed(LINTS)}"
+            told = f"`lints`: {code} is not a lint, so its severity cannot be changed; lints are {_listed(LINTS)}"
             self.problems.append(BAD_PROJECT(entry_at(self._text, "lints", code)[0], told))
         else:
             self.unknown("lints", code, LINTS, f"`lints`: there is no diagnostic `{code}`; lints are {_listed(LINTS)}")

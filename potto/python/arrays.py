@@ -58,7 +58,7 @@ def _must_have(name: str, argument: Any, given: Mapping[str, Any], record: Recor
         told.append(f"has {', '.join(f'`{field}`' for field in unknown)}, which it does not know")
     near = next((close for field in unknown for close in near_names(field, missing)), None)
     hint = f"did you mean `{near}`?" if near else f"its fields are {', '.join(f'`{f}`' for f in record.fields)}"
-    raise wrong_call(f"`{name}` is {record.name}, and what is given {' and '.join(told)}", hint)
+    raise wrong_call(f"`{name}` is {record.name}, but what is given {' and '.join(told)}", hint)
 
 
 def has_arrays(type: Type) -> bool:

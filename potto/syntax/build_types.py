@@ -125,7 +125,9 @@ def list_type(context: Context, v: Values) -> ArrayType:
     items: list[Size | TypeExpr] = v[1]
     last = items[-1]
     if len(items) > 1 or isinstance(last, Size):
-        context.report(kinds.BAD_TYPE(span, "the type of the elements is missing", help="write it behind: `[n] Real`"))
+        context.report(
+            kinds.BAD_TYPE(span, "the type of the elements is missing", help="write it after the size: `[n] Real`")
+        )
     item = RealType(span, "Real", False, ()) if isinstance(last, Size) else last
     return ArrayType(span, (Size(Span(v[0].end, v[0].end), "", 0),), item)
 

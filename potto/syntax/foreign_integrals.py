@@ -52,7 +52,7 @@ def foreign_integral(text: str, tokens: Sequence[Token], found: Sequence[Diagnos
             return _rewritten(word, head.bounds, end, found)
         called = _called(text, rest)
         if called is not None:
-            return kinds.OTHER_LANGUAGE(word.span, "an integral is no call", help=f"write `{called}`")
+            return kinds.OTHER_LANGUAGE(word.span, "an integral is not a call", help=f"write `{called}`")
     return None
 
 

@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 _TYPE = re.compile(r"[A-Z([]")
 _STATEMENTS = {
     "while": "there are no loops but `for` over a list in a script; `sum i in 1..n (…)` adds, recursion repeats",
-    "class": "values with names for their parts are records: `record Camera(eye: Real, focal: Real)`",
-    "struct": "values with names for their parts are records: `record Camera(eye: Real, focal: Real)`",
+    "class": "a value with named parts is a record: `record Camera(eye: Real, focal: Real)`",
+    "struct": "a value with named parts is a record: `record Camera(eye: Real, focal: Real)`",
     "function": "write `def f(x) …`",
     "func": "write `def f(x) …`",
     "fn": "write `def f(x) …`",
@@ -33,7 +33,7 @@ _STATEMENTS = {
     "elif": "write `else if`",
     "with": "take it out",
     "assert": "write a comment `#> e` and under it `#= value`, which `potto test` checks",
-    "raise": "an error cannot be raised",
+    "raise": "errors cannot be raised",
     "global": "names of the file are known in its definitions",
 }
 

@@ -294,7 +294,7 @@ _GOES_WITH = {
     "FOR": "a `for` starts a line of its own",
     "SUM": "write `sum i in 1..n (body)`",
     "IF": "an `if` comes first: `if p then a else b`",
-    "SEMI": "a line ends without `;`",
+    "SEMI": "a line needs no `;` at its end",
     "COMMA": "to make a tuple, write parentheses around it",
     "TILDE": "`x ~ normal(m, s)` goes among the bounds of an integral",
     "DOTDOT": "`1..n` goes with `sum`",

@@ -109,7 +109,7 @@ def _behind(inference: Inference, size: Type, node: nodes.Index, index: nodes.Ex
     message = f"the index `{print_expression(index)}` is out of range: it is not below the number of elements"
     inference.report(kinds.OUT_OF_RANGE(
         index.span, message, label="behind the last", related=_defined(inference, node.array, "is defined here"),
-        help=f"indices count from 0, so that the last one is `{last}`", suggestions=(suggest(index.span, last),),
+        help=f"indices count from 0, so the last one is `{last}`", suggestions=(suggest(index.span, last),),
     ))  # fmt: skip
 
 
@@ -137,7 +137,7 @@ def _out_of_range(inference: Inference, known: int, size: int, node: nodes.Index
         count, label, help = "no elements", "there are none", "an array without elements has no index"
     else:
         count = f"{size} element{'s' if last else ''}"
-        label, help = f"not in 0..{last}", f"indices count from 0, so that the last one is {last}"
+        label, help = f"not in 0..{last}", f"indices count from 0, so the last one is {last}"
     if known < 0 <= last:
         help += f"; the last element is `[{last}]`"
     message = f"the index {known} is out of range: the array has {count}"
@@ -260,8 +260,8 @@ def _not_empty(inference: Inference, node: nodes.Reduction, sizes: list[Type]) -
         if isinstance(count, Count) and count.number <= 0:
             what = "range" if isinstance(clause.over, nodes.Range) else "array"
             inference.report(kinds.EMPTY(
-                clause.over.span, f"`{node.op}` goes through an empty {what}: nothing is the {which}",
-                label="empty", help=f"give a value that counts as well: `{node.op}(a, b)` of two numbers",
+                clause.over.span, f"`{node.op}` goes through an empty {what}, which has no {which} element",
+                label="empty", help=f"give a value that also counts: `{node.op}(a, b)` of two numbers",
             ))  # fmt: skip
 
 

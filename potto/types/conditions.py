@@ -35,7 +35,7 @@ def _unary(inference: Inference, node: nodes.Unary) -> Type:
     found = inference.infer(node.operand)
     if is_vector(found):
         return found
-    inference.need_number(found, node.operand, f"what stands behind `{node.op}`")
+    inference.need_number(found, node.operand, f"what follows `{node.op}`")
     return REAL
 
 

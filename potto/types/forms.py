@@ -26,7 +26,7 @@ def deriv(inference: Inference, node: nodes.Apply) -> Type:
     if not isinstance(found, Function | Meta):
         help = "write it as a function of what it depends on: `deriv(\\t . …)`"
         if isinstance(without_parentheses(inner), nodes.Apply):
-            help = "derive the function and apply the result: `deriv(f)(…)`"
+            help = "differentiate the function and apply the result: `deriv(f)(…)`"
         message = f"`deriv` takes a function, but this is {describe(found)}"
         inference.report(kinds.NOT_A_FUNCTION(inner.span, message, label=describe(found), help=help))
         return UNKNOWN

@@ -167,7 +167,7 @@ def comparison(expr: nodes.Expr, what: str) -> Diagnostic:
     return kinds.TRUTH_ESCAPES(
         expr.span,
         f"{what}, but this is a comparison",
-        label="neither true nor false is a value",
+        label="true and false are not values",
         help="put it in brackets, `[x < t]`, for 1 where it holds and 0 elsewhere",
         suggestions=(around(expr.span, "[", "]", f"Write `[{shortened(print_expression(expr))}]`"),),
     )
@@ -235,7 +235,9 @@ def no_field(outside: Outside, span: Span, name: str, record: RecordName, label:
         message = f"`{record.name}` has no column `{name}`"
         if name in record.texts:
             message = f"the column `{name}` of `{record.name}` holds text, which programs cannot use"
-            help = "only columns of numbers are loaded; write a number for each text, such as 0 and 1, in a column more"
+            help = (
+                "only columns of numbers are loaded; write a number for each text, such as 0 and 1, in another column"
+            )
     elif "." in record.name:  # another file of data
         message = f"`{record.name}` holds no `{name}`"
     return kinds.UNKNOWN_FIELD(span, message, label=label, related=related, help=help, suggestions=instead(span, near))

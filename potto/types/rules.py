@@ -111,7 +111,7 @@ class _Wording:
     def _here(self) -> str:
         match self.sink.kind:
             case "jump":
-                return f"`{self.sink.node}` jumps, so that its argument may not depend on {self._names()}"
+                return f"`{self.sink.node}` jumps, so its argument may not depend on {self._names()}"
             case "sum":
                 return f"this bound of a sum depends on {self._names()}"
             case "count":
@@ -128,11 +128,11 @@ class _Wording:
         name = f"`{owner.name}`" if isinstance(owner, DefinitionTarget) else "this function"
         parameter = reason.parameter if reason else "its parameter"
         does = {
-            "jump": f"takes a builtin that jumps of {parameter}",
-            "sum": f"takes the bound of a sum from {parameter}",
-            "count": f"takes how far a measure counts from {parameter}",
-            "index": f"takes an index from {parameter}",
-            "equality": f"asks for an equality of {parameter}",
+            "jump": f"applies a builtin that jumps to {parameter}",
+            "sum": f"bounds a sum by {parameter}",
+            "count": f"bounds the count of a measure by {parameter}",
+            "index": f"indexes by {parameter}",
+            "equality": f"tests the equality of {parameter}",
             "declared": f"declares {parameter} to be `Real`",
         }.get(self.sink.kind, f"decides a plain condition by {parameter}")
         return f"{name} {does}, which depends on {self._names()} here"

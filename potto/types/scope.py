@@ -216,7 +216,7 @@ def _no_module(node: nodes.Member, what: str, help: str = "") -> Diagnostic:
     if not help and is_builtin(node.name) and not what.startswith(f"`{node.path}`"):
         help = f"`{node.name}` is a builtin: write it without `{node.path}.`"
     if not help and "." not in node.path:
-        help = f"for one more parameter of a function write blanks around the dot: `{node.path} . {node.name}`"
+        help = f"for a further parameter of a function, put blanks around the dot: `{node.path} . {node.name}`"
     message = f"{what}, so `{node.path}.{node.name}` is not defined"
     return NOT_DEFINED(node.path_span, message, label="not a module", help=help)
 

@@ -122,7 +122,7 @@ def _named(
     names = [parameter.name for parameter in parameters if parameter.name]
     written = without_parentheses(argument.value)
     if not isinstance(written, nodes.Name):
-        help = f"the numbers are given to what it makes: `{form}(f, c)(0.3)`" if names else ""
+        help = f"the numbers go to the function that it makes: `{form}(f, c)(0.3)`" if names else ""
         message = f"what follows the function in `{form}(…)` is the name of a parameter"
         inference.report(kinds.UNKNOWN_KEYWORD(written.span, message, label="not a name", help=help))
         return None

@@ -131,4 +131,4 @@ def _crashed(text: str, error: Exception) -> Iterator[Part]:
 
     said = report(["repl", "-c", text], error)
     yield Part("error", said.removeprefix("potto: "), {"error": said})
-    yield note("the session goes on; nothing is lost")
+    yield note("the session goes on, and nothing is lost")

@@ -142,14 +142,14 @@ def test_damaged_files_are_answered(data: st.DataObject) -> None:
     ("name", "content", "message"),
     [
         ("a.npy", b"", "the file is empty"),
-        ("a.npy", b"1,2\n3,4\n and more", "the file is no NPY file: it does not start as one"),
+        ("a.npy", b"1,2\n3,4\n and more", "the file is not an NPY file: it does not start like one"),
         ("a.npy", saved(np.eye(3))[:-1], "the file ends too early: it has 199 bytes where its head promises 200"),
         ("a.npy", b"\x93NUMPY\x09\x00\x00\x00\x00\x00\x00", "the file is of version 9 of NPY, which is not known"),
         ("a.npy", saved(np.eye(3)).replace(b"{", b"(", 1), "the head of the NPY file is broken"),
         ("a.npy", saved(np.eye(3)).replace(b"(3, 3)", b"(3,-3)", 1), "the head of the NPY file is broken"),
         ("a.npy", b"\x93NUMPY\x02\x00\xff\xff\xff\x7f", "the head of the NPY file is too long: 2147483659 bytes"),
-        ("a.npz", b"", "the file is no NPZ file: file is not a zip file"),
-        ("a.npz", saved(np.eye(3)), "the file is no NPZ file: file is not a zip file"),
+        ("a.npz", b"", "the file is not an NPZ file: file is not a zip file"),
+        ("a.npz", saved(np.eye(3)), "the file is not an NPZ file: file is not a zip file"),
         ("a.npz", many(), "the file holds no arrays"),
     ],
 )

@@ -67,7 +67,7 @@ def test_any_json_is_answered(data: Any) -> None:  # fmt: skip
         ("[]", "P0803", 1, None, "line 1: the list is empty"),
         ("{}", "P0805", None, None, "the file holds no values: its object is empty"),
         ('{"x": 1, "x": 2}', "P0805", None, None, "an object has the name `x` twice"),
-        ("[1,\n2,]", "P0805", 2, None, "line 2 is no JSON: "),
+        ("[1,\n2,]", "P0805", 2, None, "line 2 is not JSON: "),
         (" \n", "P0805", None, None, "the file holds no values"),
         ("[" * 40 + "1" + "]" * 40, "P0805", None, None, "lists are nested more than 32 deep"),
         ("[" * 100_000, "P0805", None, None, "lists are nested more than 32 deep"),

@@ -136,7 +136,7 @@ def test_what_is_said_without_pillow(monkeypatch: pytest.MonkeyPatch) -> None:
     ("content", "message"),
     [
         (b"", "the file is empty"),
-        (b"GIF89a", "the file is neither PNG nor JPEG: it does not start as one"),
+        (b"GIF89a", "the file is neither PNG nor JPEG: it does not start like one"),
         (b"\x89PNG\r\n\x1a\n", "the head of the PNG file is broken"),
         (b"\xff\xd8\xff\xe0\x00\x04ab", "the JPEG file does not say how large the picture is"),
     ],

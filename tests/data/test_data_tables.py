@@ -150,8 +150,8 @@ def test_a_long_text_is_shown_in_part() -> None:
 def test_what_is_no_utf8() -> None:
     found = mistake("t.csv", b"x\n1\n\xe9\n")
     assert (found.code, found.row, found.found) == ("P0805", 3, "0xe9")
-    assert found.message == "line 3 is not text in UTF-8: it holds the byte 0xe9"
-    assert mistake("t.csv", "x\n1".encode("utf-16")).message == "this is a text in UTF-16, not in UTF-8"
+    assert found.message == "line 3 is not UTF-8 text: it holds the byte 0xe9"
+    assert mistake("t.csv", "x\n1".encode("utf-16")).message == "this is UTF-16 text, not UTF-8"
     assert mistake("t.csv", b"\xef\xbb\xbfx\n\xff").row == 2
 
 

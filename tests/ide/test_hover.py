@@ -75,9 +75,11 @@ def test_condition_shows_what_completes_it(needle):
 def test_condition_without_a_diffeomorphism_says_why():
     f = fixture("def f(t)\n    integral ([0, 1], [0, 1]) [x^5 + x*y^3 + sin(x*y) + y^5 < t] d(x, y)\n")
     text = f.hover(" < t", 1)
-    assert text.startswith("**no diffeomorphism** over `x, y`: where ") and "the surface is found by numbers" in text
+    assert (
+        text.startswith("**not a diffeomorphism** over `x, y`: where ") and "the surface is found numerically" in text
+    )
     f = fixture("def f(t)\n    integral [0, 1] [0.3*[x < t] + x^3 - x $0< t] d(x)\n")
-    assert f.hover().startswith("**no diffeomorphism** over `x`: where ")
+    assert f.hover().startswith("**not a diffeomorphism** over `x`: where ")
 
 
 def test_variable_of_integration_shows_its_domain_and_what_varies_with_it():
@@ -241,7 +243,7 @@ def test_a_variable_of_integration_says_whose_bounds_vary_with_it():
 
 def test_a_condition_without_an_inverse_in_closed_form_says_so():
     shown = fixture("def f(t)\n    integral ([0, 1], [0, 1]) $0[sin(x*y) > t] d(x, y)\n").hover()
-    assert "inverse: none in closed form; the surface is found by numbers" in shown
+    assert "inverse: none in closed form; the surface is found numerically" in shown
     singular = "(if $0diffeo(x + y + t, 2*x + 2*y) then 1 else 0)"
     shown = fixture(f"def f(t)\n    integral ([0, 1], [0, 1]) {singular} d(x, y)\n").hover()
     assert "no diffeomorphism" in shown and "determinant is 0" in shown

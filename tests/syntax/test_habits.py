@@ -70,7 +70,7 @@ def test_mathematics() -> None:
         def f(t) integral [0, 1], [0, t] x*y d(x, y)
         #        ^^^^^^^^^^^^^^^^^^^^^^^ error[P0117]: the bounds of an integral come first
         def f(t) integral([0, t], 2*x, x)
-        #        ^^^^^^^^ error[P0117]: an integral is no call
+        #        ^^^^^^^^ error[P0117]: an integral is not a call
         def f(n) sum i = 1..n (i^2)
         #              ^ error[P0104]: expected `in` after the variable of `sum`
         def f(x) -> x^2

@@ -83,7 +83,7 @@ def test_an_index_into_few_elements() -> None:
     """)
     found = only("k = [][0]")
     assert found.label == "there are none" and found.help == "an array without elements has no index"
-    assert only("k = [7][1]").help == "indices count from 0, so that the last one is 0"
+    assert only("k = [7][1]").help == "indices count from 0, so the last one is 0"
 
 
 def test_indices() -> None:
@@ -123,15 +123,15 @@ def test_an_index_that_is_a_size() -> None:
         l = k[len(k)]
         #     ^^^^^^ error[P0328]: the index 3 is out of range: the array has 3 elements
     """)
-    assert only("def a(xs: [n] Real) xs[n]").help == "indices count from 0, so that the last one is `n - 1`"
-    assert only("def a(xs: [n + 2] Real) xs[n + 3]").help == "indices count from 0, so that the last one is `n + 1`"
+    assert only("def a(xs: [n] Real) xs[n]").help == "indices count from 0, so the last one is `n - 1`"
+    assert only("def a(xs: [n + 2] Real) xs[n + 3]").help == "indices count from 0, so the last one is `n + 1`"
 
 
 def test_an_index_inside_of_another_definition_must_not_vary() -> None:
     check("""
         def at(xs, i) xs[i]
         def f(t) integral [0, 3] at([1, 2, t], x) d(x)
-        #                                      ^ error[P0301]: `at` takes an index from its parameter `i`
+        #                                      ^ error[P0301]: `at` indexes by its parameter `i`
     """)
 
 
@@ -177,9 +177,9 @@ def test_an_index_is_a_whole_number() -> None:
 def test_nothing_has_no_least() -> None:
     check("""
         a = min x in [] (x)
-        #            ^^ error[P0334]: `min` goes through an empty array
+        #            ^^ error[P0334]: `min` goes through an empty array, which has no least element
         def f(t) max i in 3..1 (t*i)
-        #                 ^^^^ error[P0334]: `max` goes through an empty range
+        #                 ^^^^ error[P0334]: `max` goes through an empty range, which has no greatest element
         b = sum x in [] (x)
         c = product i in 3..1 (i)
         def g(xs: [n] Real) min x in xs (x)

@@ -240,8 +240,8 @@ def test_the_same_through_other_definitions() -> None:
         def upto(n) sum i in 1..n (i)
         def same(a, b) [a == b]
         def f(t) integral [0, 3] down(x) + upto(x) + same(x, t) d(x)
-        #                             ^ error[P0302]: `down` takes a builtin that jumps of its parameter `y`
-        #                                       ^ error[P0303]: `upto` takes the bound of a sum from its parameter `n`
+        #                             ^ error[P0302]: `down` applies a builtin that jumps to its parameter `y`
+        #                                       ^ error[P0303]: `upto` bounds a sum by its parameter `n`
         #                                                 ^ error[P0304]: `same` asks for an equality
     """)
 

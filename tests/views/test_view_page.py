@@ -100,6 +100,17 @@ def test_text_and_picture_call_a_surface_the_same(address: str) -> None:
     assert 'data-equation="x = t"' in seen["svg"]
 
 
+def test_also_where_a_part_or_a_variable_has_another_name_in_the_picture() -> None:
+    world = World()
+    text = "def slant(w: (Real, Real), x) x*integral [0, 1] [w.1*x < w.0] d(x)\n"
+    answers = Answers(world, world.put("program.po", text))
+    (mark,) = answers.answer("/open", {"name": "slant"})["conditions"]  # type: ignore[index]
+    values = {"w_1": 0.2, "w_2": 0.5, "x": 1.0}
+    seen = answers.answer("/look", {"name": "slant", "values": values, "wrt": "w_1", "which": 0}) or {}
+    (surface,) = seen["surfaces"]
+    assert surface["equation"] != mark["equation"] == surface["condition"]
+
+
 def test_ghosts_are_a_step_away_and_nodes_are_where_it_was_evaluated(address: str) -> None:
     question = {"name": "f", "values": {"t": 0.5}, "wrt": "t", "which": 0, "ghost": 0.1, "nodes": True}
     found = asked(address, "/look", question)

@@ -84,7 +84,7 @@ def _slopes(point: ide.Point) -> Callable[[Result], Result]:
         lines = [f"{point.text} = {found['shown']}"]
         lines += [f"  by {s['by']}: {s['shown']}" for s in found["slopes"]]
         missing = [name for name, _ in point.slopes if all(name != s["by"] for s in found["slopes"])]
-        lines += [f"  by {name}: no number, it jumps there" for name in missing]
+        lines += [f"  by {name}: not a number, it jumps there" for name in missing]
         return {**found, "value": found["text"], "text": "\n".join(lines)}
 
     return with_text

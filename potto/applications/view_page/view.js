@@ -123,10 +123,10 @@ function difference(shot, other, place) {
   return `Δ ${by < 0 ? "−" : "+"}${Math.abs(by).toPrecision(3)}`;
 }
 
-function surfaceName({ equation, inside }) {
+function surfaceName({ equation, condition, inside }) {
   const name = make("span", { className: "surface-name", textContent: equation });
-  name.dataset.equation = equation;
-  name.onclick = () => chosen(equation);
+  name.dataset.equation = condition;
+  name.onclick = () => chosen(condition);
   return make("li", {}, name, inside ? "" : " is not in the domain");
 }
 

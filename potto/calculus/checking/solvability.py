@@ -237,13 +237,13 @@ def no_inverse(
     help = _ADVICE[role if searchable else "bracket"].format(format_term(surface))  # it is to be written
     inner = next((node for node in postorder(surface) if isinstance(node, Integral)), None)
     if inner is not None:  # neither can be done: an inverse is a formula, and is verified as one
-        reasons = (*reasons, "an integral is evaluated by numbers, and the surface has to be known before")
+        reasons = (*reasons, "integrals are evaluated numerically, and the surface must be known beforehand")
         what = " or ".join(f"`{name}`" for name in variables if name in inner.free)
         help = f"write `{format_term(inner)}` as a formula in {what}" if what else help
     called = {node.function for node in postorder(surface) if isinstance(node, App)}
     named = next((node for node in postorder(surface) if isinstance(node, Global) and node not in called), None)
     if named is not None and role == "bracket":  # what is arithmetic, or an array, is not seen as a name here
-        reasons = (*reasons, f"`{named.name}` is found by numbers, and the surface has to be known before")
+        reasons = (*reasons, f"`{named.name}` is found numerically, and the surface must be known beforehand")
         help = f"make `{named.name}` a parameter, and give the definition as its argument"
     return Problem(
         NO_INVERSE,

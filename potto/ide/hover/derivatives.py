@@ -231,7 +231,7 @@ def _integral(found: DerivativeText, item: IntegralText, title: str) -> str:
         blocks += [f"{'boundary'.ljust(widest)}  {text}" for text in meeting or ["0"]]
     lines += ["```text", *blocks, "```"]
     if item.reason:
-        lines += ["", f"the boundary is found by numbers, because {item.reason}"]
+        lines += ["", f"the boundary is found numerically, because {item.reason}"]
     if item.surfaces:
         lines += ["", "**surfaces**", ""]
     for surface in item.surfaces:
@@ -249,10 +249,10 @@ def condition_markdown(info: ConditionInfo) -> str:
     """A condition: its diffeomorphism, inverse and determinant, or why there is none."""
     over = ", ".join(info.variables)
     if info.problem:
-        first = f"**no diffeomorphism** over {code(over)}: {info.problem}"
+        first = f"**not a diffeomorphism** over {code(over)}: {info.problem}"
         return "\n".join([first, *(f"\n{note}" for note in info.notes)])
     if info.searched:
-        first = f"**no diffeomorphism** over {code(over)}: where {code(info.equation)} has no closed form"
+        first = f"**not a diffeomorphism** over {code(over)}: where {code(info.equation)} has no closed form"
         return "\n".join([first, "", *_facts(info)])
     all_of_it = ", ".join((*info.coordinates, *info.missing))
     lines = [fence(f"diffeo({all_of_it})"), f"a diffeomorphism of {code(over)}"]
@@ -268,7 +268,7 @@ def _facts(info: ConditionInfo) -> list[str]:
     for branch in info.inverse:
         facts.append(f"- inverse: {code(inverse_text(info.values, branch))}")
     if not info.inverse:
-        facts.append("- inverse: none in closed form" + ("" if info.roots else "; the surface is found by numbers"))
+        facts.append("- inverse: none in closed form" + ("" if info.roots else "; the surface is found numerically"))
     if info.determinant:
         facts.append(f"- determinant: {code(info.determinant)}")
     if info.calls:

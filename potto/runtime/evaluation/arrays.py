@@ -65,7 +65,9 @@ def _size(size: Value) -> int:
         raise PottoError([RAGGED(errors.NOWHERE, message, help="evaluate them one by one")])
     count = float(flat[0])
     if count != np.rint(count) or not np.isfinite(count):
-        raise PottoError([NO_PLACE(errors.NOWHERE, f"an array cannot have {count!r} elements: no whole number")])
+        raise PottoError(
+            [NO_PLACE(errors.NOWHERE, f"an array cannot have {count!r} elements: that is not a whole number")]
+        )
     if count > MOST_ELEMENTS:
         raise PottoError([NO_PLACE(errors.NOWHERE, f"an array of {count:.0f} elements is too large")])
     return max(0, int(count))
@@ -144,7 +146,7 @@ def _places(place: Number, size: int) -> Any:
         message = f"the index {first} is out of range: the array has {size} element{'s' if size > 1 else ''}"
         if not size:
             message = f"this array or range is empty: it has no element {first}"
-            last = "nothing is the least or the greatest of an empty array or range, as in `min x in xs (x)`"
+            last = "an empty array or range has neither a least nor a greatest element, as in `min x in xs (x)`"
         raise PottoError([OUT_OF_RANGE(errors.NOWHERE, message, notes=(last,))])
     return at.astype(np.int64)
 

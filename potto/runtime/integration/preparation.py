@@ -197,7 +197,7 @@ def _counted(term: Integral, reach: Reach, again: bool) -> Integral:
     variables = frozenset(term.variables)
     calls = [node for node in postorder(body) if isinstance(node, App) and node.free & variables]
     if any(reach.deltas(call.function) for call in calls):
-        raise _not_found("what is derived is out of sight")
+        raise _not_found("what is differentiated is out of sight")
     before = {node for node in postorder(term.body) if isinstance(node, Delta)}
     found = any(isinstance(n, Delta) and n not in before and n.coordinates[0].free & variables for n in postorder(body))
     return with_integrand(term, body) if found or again else term
