@@ -4,9 +4,9 @@ Owns the hook that `pyproject.toml` names, with the list of modules beside it. m
 and puts it next to its source, so that the same package works with and without; only the time differs. Wheels without
 it are pure Python, and so are editable installations: machine code of an older text would hide the text.
 
-What is a `value` becomes a frozen dataclass to mypyc, which knows those, but for its `__init__`, which it leaves to the
-interpreter. Those are written out for it, which makes values in a tenth of the time; what else they need they are given
-by `potto.quick.machine` when they are loaded, in a tenth of the time that `dataclass` takes. No line moves, so that
+What is a `value` becomes a dataclass, which mypyc knows, but for its `__init__`, which it leaves to the interpreter. Those
+are written out for it, which makes values in a tenth of the time; the other methods they are given behind their class
+by `potto.quick.machine`, in a fraction of the time that `dataclass` takes to write them. No line moves, so that
 tracebacks still name the right ones.
 """
 
@@ -22,6 +22,7 @@ from typing import Any
 
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
+VALUE = "dataclass(init=False, repr=False, eq=False)"
 # What runs where the packages lie side by side as they are installed, without a project that setuptools could look at.
 SETUP = """
 from mypyc.build import mypycify
@@ -81,13 +82,16 @@ class FrontEndHook(BuildHookInterface[Any]):
 
 
 def with_inits(text: str) -> str:
-    """A module whose dataclasses write out their `__init__`, as far as it does no more than take the fields."""
-    text = text.replace("\n@value\n", "\n@machine(frozen=True, slots=True)\n")
-    text = text.replace("\nfrom potto.quick import", "\nfrom potto.quick import machine; from potto.quick import")
-    lines = text.split("\n")
+    """A module whose dataclasses write out their `__init__`, as far as it does no more than take the fields, and whose
+    values are dataclasses."""
+    known = "from dataclasses import dataclass; from potto.quick import machine; from potto.quick import"
+    text = text.replace("\nfrom potto.quick import", f"\n{known}")
+    lines = text.replace("\n@value\n", f"\n@{VALUE}\n").split("\n")
     for node in ast.parse(text).body:
         if isinstance(node, ast.ClassDef):
             _write_init(node, lines)
+            if "value" in map(ast.unparse, node.decorator_list):
+                lines[(node.end_lineno or 0) + 1] = f"machine({node.name})"  # the second of two empty ones
     return "\n".join(lines)
 
 
@@ -95,8 +99,7 @@ def _write_init(node: ast.ClassDef, lines: list[str]) -> None:
     """Write it into the empty line behind the fields."""
     fields = [statement for statement in node.body if isinstance(statement, ast.AnnAssign)]
     own = {statement.name for statement in node.body if isinstance(statement, ast.FunctionDef)}
-    called = ("dataclass(", "machine(")
-    dataclass = next((d for d in node.decorator_list if ast.unparse(d).startswith(called)), None)
+    dataclass = next((d for d in node.decorator_list if ast.unparse(d).startswith(("dataclass(", "value"))), None)
     more = node.bases or own & {"__init__", "__post_init__"} or any("field(" in ast.unparse(field) for field in fields)
     if dataclass is None or not fields or more:
         return
@@ -107,4 +110,5 @@ def _write_init(node: ast.ClassDef, lines: list[str]) -> None:
         body = "; ".join(f"self.{name} = {name}" for name in names)
         lines[place] = f"    def __init__(self, {head}) -> None: {body}  # type: ignore"
         line = dataclass.lineno - 1
-        lines[line] = lines[line].replace("(", "(init=False, ", 1)
+        if "init=" not in lines[line]:
+            lines[line] = lines[line].replace("dataclass(", "dataclass(init=False, ", 1)

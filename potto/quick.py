@@ -12,7 +12,7 @@ import copyreg
 from collections.abc import Callable
 from functools import cache
 from operator import attrgetter
-from typing import TYPE_CHECKING, Any, TypeVar, dataclass_transform
+from typing import Any, TypeVar, dataclass_transform
 
 _T = TypeVar("_T")
 
@@ -39,23 +39,11 @@ def value(cls: type[_T]) -> type[_T]:
     return made  # type: ignore[no-any-return]
 
 
-if TYPE_CHECKING:
-    from dataclasses import dataclass as machine
-else:
-
-    def machine(*, init: bool = True, **_: bool) -> Callable[[type[_T]], type[_T]]:
-        """In the place of `dataclass`, which the compiler takes it for: for values whose fields and constructor are
-        machine code."""
-
-        def given(cls: type[_T]) -> type[_T]:
-            names = tuple(vars(cls).get("__annotations__", ()))
-            assert not (init and names), "the constructor is written out"
-            for name, shared in _shared(names).items():
-                if name not in vars(cls):
-                    setattr(cls, name, shared)
-            return cls
-
-        return given
+def machine(cls: type) -> None:
+    """Give a class whose fields and constructor are machine code the rest of a value."""
+    for name, shared in _shared(tuple(vars(cls).get("__annotations__", ()))).items():
+        if name not in vars(cls):
+            setattr(cls, name, shared)
 
 
 def replace(value: _T, /, **changes: Any) -> _T:

@@ -246,7 +246,7 @@ def test_a_condition_without_an_inverse_in_closed_form_says_so():
     assert "inverse: none in closed form; the surface is found numerically" in shown
     singular = "(if $0diffeo(x + y + t, 2*x + 2*y) then 1 else 0)"
     shown = fixture(f"def f(t)\n    integral ([0, 1], [0, 1]) {singular} d(x, y)\n").hover()
-    assert "no diffeomorphism" in shown and "determinant is 0" in shown
+    assert "not a diffeomorphism" in shown and "determinant is 0" in shown
 
 
 def test_plain_condition_says_what_decides_it():

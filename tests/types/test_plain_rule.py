@@ -242,7 +242,7 @@ def test_the_same_through_other_definitions() -> None:
         def f(t) integral [0, 3] down(x) + upto(x) + same(x, t) d(x)
         #                             ^ error[P0302]: `down` applies a builtin that jumps to its parameter `y`
         #                                       ^ error[P0303]: `upto` bounds a sum by its parameter `n`
-        #                                                 ^ error[P0304]: `same` asks for an equality
+        #                                                 ^ error[P0304]: `same` tests the equality
     """)
 
 
