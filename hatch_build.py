@@ -4,9 +4,9 @@ Owns the hook that `pyproject.toml` names, with the list of modules beside it. m
 and puts it next to its source, so that the same package works with and without; only the time differs. Wheels without
 it are pure Python, and so are editable installations: machine code of an older text would hide the text.
 
-What is a `value` becomes a dataclass, which mypyc knows, but for its `__init__`, which it leaves to the interpreter. Those
-are written out for it, which makes values in a tenth of the time; the other methods they are given behind their class
-by `potto.quick.machine`, in a fraction of the time that `dataclass` takes to write them. No line moves, so that
+What is a `value` becomes a dataclass, which mypyc knows, but for its `__init__`, which it leaves to the interpreter.
+Those are written out for it, which makes values in a tenth of the time; the other methods they are given behind their
+class by `potto.quick.machine`, in a fraction of the time that `dataclass` takes to write them. No line moves, so that
 tracebacks still name the right ones.
 """
 
