@@ -76,7 +76,8 @@ class Plan(Struct, frozen=True, dict=True):
     folds: whether a surface that is searched for may have folds where the variables further out can't be cut.
     degrees: of what is integrated over each variable between its cuts, where it is a polynomial in it.
     over: a level set, over whose roots the innermost variable is summed.
-    kinks: what is 0 where builtins have kinks, as one tuple, without what is known to be 0 at single places alone.
+    kinks: what is 0 where builtins have kinks, as one tuple, without what is known to be 0 at single places alone;
+    the last of them, so many as there are steps, where what parameters alone decide changes.
     """
 
     term: Integral
@@ -97,6 +98,7 @@ class Plan(Struct, frozen=True, dict=True):
     degrees: tuple[int | None, ...] = ()
     over: LevelSet | None = None
     kinks: Lam = NO_KINKS
+    steps: int = 0
 
     @cached_property
     def box(self) -> Box | None:
@@ -216,7 +218,7 @@ def make(term: Integral, resolve: Resolve, decide: Decide, inline: Resolve, numb
         tuple((t, v) for t, v in asked.decisions.items() if not isinstance(t, Const)),
         reaches,
         hides or over is not None,
-        tuple(dict.fromkeys(f.surface for f in found)),
+        tuple(dict.fromkeys(f.surface for f in found if f.kind != "step")),
         inlined,
         _doublings(term, found),
         None if inlined is None else straight(term, inlined, levels),
@@ -225,16 +227,20 @@ def make(term: Integral, resolve: Resolve, decide: Decide, inline: Resolve, numb
         _may_fold(term, levels),
         () if inlined is None else _degrees(inlined, levels),
         over,
-        _kinks(term, found, asked),
+        *_kinks(term, found, asked),
     )
 
 
-def _kinks(term: Integral, found: Iterable[Finding], asked: _Asked) -> Lam:
-    """Where an integrand, and what it is integrated over, have kinks that may lie along a stretch."""
-    box = extents(term)
+def _kinks(term: Integral, found: Iterable[Finding], asked: _Asked) -> tuple[Lam, int]:
+    """Where an integrand, and what it is integrated over, have kinks that may lie along a stretch, and how many of
+    these are steps of parameters alone."""
+    box, names = extents(term), frozenset(term.variables)
     inside = (*found, *(f for pair in term.bounds for bound in pair for f in asked.findings(bound)))
     kinks = dict.fromkeys(f.surface for f in inside if f.kind == "kink")
-    return function_of(tuple_(tuple(k for k in kinks if not any(monotone(k, v, box) for v in term.variables))))
+    along = tuple(k for k in kinks if not any(monotone(k, v, box) for v in term.variables))
+    jumps = dict.fromkeys(f.surface for f in inside if f.kind in ("jump", "step") and not f.surface.free & names)
+    steps = tuple(step for step in jumps if step not in kinks)
+    return function_of(tuple_((*along, *steps))), len(steps)
 
 
 def _degrees(body: Term, levels: Sequence[LevelPlan]) -> tuple[int | None, ...]:

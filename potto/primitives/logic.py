@@ -5,9 +5,18 @@
 
 from __future__ import annotations
 
-from potto.primitives.registry import Primitive, register
+from potto.core.terms import Term, sub
+from potto.primitives.registry import Primitive, Terms, register
 
 _ANY = (-1e6, 1e6)
+
+
+def _difference(*numbers: Term) -> Terms:
+    return (sub(*numbers),)
+
+
+def _none(*conditions: Term) -> Terms:
+    return ()
 
 
 def _truth(name: str, arity: int, numpy: str, doc: str, example: str, python: str = "") -> Primitive:
@@ -22,6 +31,7 @@ def _truth(name: str, arity: int, numpy: str, doc: str, example: str, python: st
             plain=True,
             surface=False,
             truth=True,
+            steps=_none if numpy.startswith("logical") else _difference,
             domain=(_ANY,) * arity,
             example=example,
         )

@@ -228,6 +228,7 @@ sign = register(
         doc="-1, 0 or 1. It jumps, so it takes plain values only; under an integral use `[x > 0]`.",
         plain=True,
         brackets="`2*[x > 0] - 1`",
+        steps=lambda x: (x,),
         domain=((-1e6, 1e6),),
         example="sign(-2.5)",
     )
@@ -245,6 +246,7 @@ floor = register(
         doc="The greatest whole number that is not above x. It jumps, so it takes plain values only.",
         plain=True,
         brackets="`sum k in 1..n ([x >= k])`, for x from 0 to n",
+        steps=lambda x: (sub(x, prim("floor", x)),),
         domain=((-1e6, 1e6),),
         example="floor(2.7)",
     )
@@ -262,6 +264,7 @@ ceil = register(
         doc="The least whole number that is not below x. It jumps, so it takes plain values only.",
         plain=True,
         brackets="`sum k in 0..n ([x > k])`, for x from 0 to n",
+        steps=lambda x: (sub(prim("ceil", x), x),),
         domain=((-1e6, 1e6),),
         example="ceil(2.2)",
     )

@@ -67,6 +67,7 @@ class Primitive(Struct, frozen=True):
     Derivatives:
     partials: the partial derivatives as terms over the arguments; None for a builtin that jumps.
     kinks: terms over the arguments whose zeros are kinks (abs: x; max: a - b).
+    steps: terms over the arguments whose zeros are jumps, of a builtin that jumps (floor: x - floor(x); <: a - b).
     cases: for builtins that choose, a margin, what they are where that is >= 0, and what they are elsewhere.
     extremes: for those of them that are the greatest or the least of terms, what they are by max and min.
     edges: terms over the arguments that are 0 at the edge of the domain and where the builtin or its derivative is
@@ -117,6 +118,7 @@ class Primitive(Struct, frozen=True):
 
     partials: Callable[..., Terms] | None = None
     kinks: Callable[..., Terms] = field(default=_none)
+    steps: Callable[..., Terms] = field(default=_none)
     cases: Callable[..., tuple[Term, Term, Term]] | None = None
     extremes: Callable[..., Term] | None = None
     edges: Callable[..., Terms] = field(default=_none)

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 
 from msgspec import Struct
+from msgspec.structs import replace
 
 from potto.calculus.algebra.rational_form import settled
 from potto.calculus.decomposition.critical import Critical, Within
@@ -68,7 +69,7 @@ class _Pool(Struct):
             self.critical[finding.critical] = None
         elif finding.kind == "center":
             self.centers[finding.surface] = None
-        else:
+        elif finding.kind != "step":  # no variable takes part in it
             surface = settled(finding.surface, frozenset(self.variables))
             jump = (finding.path, finding.strict) if finding.kind == "jump" else None
             self.put(surface, jump, finding.kind == "edge")
@@ -205,9 +206,9 @@ def outer_findings(term: Integral, resolve: Resolve, decide: Decide) -> tuple[Fi
     inner = set(term.variables)
     bounds = (f for pair in term.bounds for bound in pair for f in findings(bound, resolve, decide))
     jumps = tuple(
-        Finding("jump", f.surface, (), f.strict)
+        replace(f, path=())
         for f in (*found, *bounds)
-        if f.kind == "jump" and not f.surface.free & inner
+        if f.kind == "step" or (f.kind == "jump" and not f.surface.free & inner)
     )
     swept = sweep(term, (f for f in found if f.kind != "jump" or f.surface.free & inner), resolve, decide)
     return (*jumps, *swept.outer)

@@ -45,7 +45,7 @@ from potto.primitives import PRIMITIVES
 DEEPEST = 2000
 ROUNDS = 12  # of a recursion that are carried out in a surface
 
-Kind = Literal["jump", "kink", "edge", "center", "critical"]
+Kind = Literal["jump", "kink", "edge", "center", "critical", "step"]
 # Where a part of the program gets its functions from: a Lam for the head of a call, or None if it is not known here.
 Resolve = Callable[[Term], "Lam | Deriv | None"]
 # The value of a plain term (a condition: 1 or 0), or None where it is not decided.
@@ -57,7 +57,8 @@ class Finding(Struct, frozen=True):
 
     kind: a jump (a branch), a kink (abs, max), an edge, where the term stops being smooth or defined (sqrt at 0), or a
         center, around which a smooth term may be concentrated (x - m in exp(-(x - m)^2), u in 1/(1 + exp(u))), or a
-        critical place of an integral: of `surface` and others, somewhere inside.
+        critical place of an integral: of `surface` and others, somewhere inside; or a step, where what parameters alone
+        decide (`if a < b`, floor) changes.
     path: for a jump, the sites of the trace that lead to the branch.
     """
 
@@ -157,6 +158,9 @@ class _Search(Struct, frozen=True):
         for kink in entry.kinks(*node.args):
             for piece in self.pieces(kink, mapping):
                 yield Finding("kink", piece)
+        for step in entry.steps(*node.args):
+            for piece in self.pieces(step, mapping):
+                yield Finding("step", piece)
         for center in centers(node):
             yield Finding("center", substitute(center, mapping))
         if node.op != "div":  # a pole is no edge to cut at: the integral diverges there or the pole is outside

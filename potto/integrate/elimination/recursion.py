@@ -130,7 +130,7 @@ def _planned(
             unknown.add(head)
         return function
 
-    found = [*findings(body, known), *centers]
+    found = [*(f for f in findings(body, known) if f.kind != "step"), *centers]
     if unknown or any(f.kind == "jump" and step.variable in f.surface.free and not f.path for f in found):
         return None
     hides = False  # what is further in jumps in what is passed on, and can't be told which side to take

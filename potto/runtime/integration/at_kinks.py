@@ -55,7 +55,8 @@ def _kinks(problem: Problem) -> list[tuple[TwoSided, Ints]]:
     for number, members in lying_along(plan, problem.env, problem.batch, problem.machine):
         kink = children(plan.kinks.body)[number]
         variable = next((v for v in reversed(problem.term.variables) if v in kink.free), problem.term.variables[-1])
-        found.append((TwoSided(variable, kink, kink=True, along=True), members))
+        bends = number < len(children(plan.kinks.body)) - plan.steps
+        found.append((TwoSided(variable, kink, kink=bends, along=True), members))
     return found
 
 
