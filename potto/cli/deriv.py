@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import difflib
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 from msgspec import to_builtins
@@ -125,14 +126,16 @@ def _tell(
         errors = found.tangent_error if len(found.wrt) > 1 else (found.tangent_error,)
         return [(name, found[name], error) for name, error in zip(found.wrt, errors, strict=True)]
 
+    both = [found for found in (once, twice) if found is not None]
     if options.json:
         answer: dict[str, Any] = {"value": json_number(once.value), "error": json_number(once.error)}
         for key, found in (("gradient", once), ("hessian_product", twice)):
             if found is not None:
                 answer[key] = {name: json_number(value) for name, value, _ in sides(found)}
                 answer[f"{key}_error"] = {name: json_number(error) for name, _, error in sides(found)}
-        both = [found for found in (once, twice) if found is not None]
         answer |= {"converged": all(f.converged for f in both), "evals": sum(f.evals for f in both)}
+        if notes := _each(note for found in both for note in found.notes):
+            answer["notes"] = notes
         console.answer_json({**answer, **others})
         return
     console.answer(f"{options.name} = {answer_text(once.value, once.error, once.converged)}")
@@ -142,5 +145,11 @@ def _tell(
         console.answer(f"Hessian times ({', '.join(f'{name}={text}' for name, text in options.along)})")
         for name, value, error in sides(twice):
             console.answer(f"  by {name}: {answer_text(value, error, twice.converged)}")
-    for reason in dict.fromkeys((*once.reasons, *(twice.reasons if twice is not None else ()))):
+    for reason in _each(reason for found in both for reason in found.reasons):
         console.complain(f"warning: not as accurate as was asked: {reason}")
+    for note in _each(note for found in both for note in found.notes):
+        console.complain(f"note: {note}")
+
+
+def _each(said: Iterable[object]) -> list[str]:
+    return list(dict.fromkeys(map(str, said)))

@@ -44,7 +44,8 @@ class TwoSided(Event, frozen=True):
     """Why derivatives on the two sides differ: a surface lies on a bound of a variable, or on another surface.
 
     fold: or its sections along the variable appear or merge just here. Without a surface: some run along the variable.
-    along: or it is there all along the variable. kink: it is a kink of the integrand's; without a variable, a number's.
+    along: or it is there all along the variable. kink: it is a kink of the integrand's; without a variable, a number's,
+    which jumps there if it is no kink.
     hidden: rounding hides whether the surface lies there, and what that changes is part of the errors.
     """
 
@@ -55,6 +56,11 @@ class TwoSided(Event, frozen=True):
     kink: bool = False
     hidden: bool = False
     along: bool = False
+
+    @property
+    def jump(self) -> bool:
+        """Whether a number jumps there, outside of integrals."""
+        return not (self.variable or self.kink)
 
 
 class Along(Event, frozen=True):

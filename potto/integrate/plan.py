@@ -27,7 +27,7 @@ from potto.calculus.solving.enclosable import slope_of
 from potto.calculus.surfaces.branch_assignment import box_of as extents
 from potto.calculus.surfaces.case_split import by_extremes
 from potto.calculus.surfaces.discontinuities import Decide, Finding, Resolve, findings
-from potto.calculus.surfaces.hoist import hidden, hoisted
+from potto.calculus.surfaces.hoist import hidden, hoisted, split_at_bounds
 from potto.calculus.surfaces.lifted import Lifted, lifted
 from potto.calculus.surfaces.nested_brackets import has_nested, nested
 from potto.core.terms import (
@@ -187,6 +187,8 @@ def make(term: Integral, resolve: Resolve, decide: Decide, inline: Resolve, numb
     for some of the parameters, or nan.
     """
     asked = _Asked(resolve, decide)
+    if placed_along(term) is not None:
+        term = split_at_bounds(term, inline)  # while the level set still stands in it
     over = placed_along(term)
     term = by_extremes(term if over is None else integral(term.variables, term.bounds, over.weight, term.hints))
     found = asked.findings(term.body)

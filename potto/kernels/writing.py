@@ -8,6 +8,7 @@ of `Runtime` only.
 from __future__ import annotations
 
 import marshal
+from collections.abc import Sequence
 from typing import Any, Protocol
 
 from msgspec import Struct
@@ -40,7 +41,7 @@ from potto.core.terms import (
     postorder_by,
 )  # fmt: skip
 from potto.kernels.cells import Cell, Pattern, Trace, Value
-from potto.kernels.emit import Lines, Scalar
+from potto.kernels.emit import ZERO, Lines, Scalar
 from potto.kernels.kinks import watched
 from potto.kernels.taping import TapeLines
 from potto.kernels.written import Written
@@ -70,7 +71,7 @@ class Runtime(Protocol):
     def data(self, term: Data) -> Value: ...
     def lazy(self, mask: Any, term: If | Branch, env: dict[str, Value], traces: tuple[Any, Any]) -> Value: ...
     def falls(self, surface: Any, strict: bool) -> Any: ...
-    def kink(self, term: Prim, kinks: tuple[tuple[Any, Any], ...], args: tuple[Cell, ...]) -> None: ...
+    def kink(self, term: Prim | Branch, kinks: tuple[tuple[Any, Any], ...], args: tuple[Cell, ...]) -> None: ...
     def project(self, value: Value, index: int) -> Value: ...
     def term(self, term: Term, env: dict[str, Value]) -> Value: ...
     def fail(self, term: Hole | Delta) -> Value: ...
@@ -213,9 +214,8 @@ class Writer:
                 args = [self.number(a) for a in term.args if a not in together]
                 if together:
                     args.append(self.scalar(self.added(tuple(a for a in term.args if a in together))))
-                if self.directions and self.rt.root and not self.rt.side and (kinks := watched(self.out, term, args)):
-                    found = "".join(f"{self.pack(arg)}, " for arg in args)
-                    self.out.lines.append(f"rt.kink({self.keep(term)}, {kinks}, ({found}))")
+                if self.watching and (kinks := watched(self.out, term, args)):
+                    self.watch(term, kinks, args)
                 return self.out.apply(term.op, args)
             case If() | Branch():
                 return self.conditional(term)
@@ -241,6 +241,16 @@ class Writer:
                 return self.array(term)
             case Hole() | Delta():
                 return self.dynamic(f"rt.fail({self.keep(term)})", False, ())
+
+    @property
+    def watching(self) -> bool:
+        """Whether it is to be noted where one-sided derivatives differ."""
+        return bool(self.directions and self.rt.root and not self.rt.side)
+
+    def watch(self, term: Prim | Branch, numbers: str, args: Sequence[Scalar]) -> None:
+        """Have it noted where one of these numbers is 0 to rounding."""
+        found = "".join(f"{self.pack(arg)}, " for arg in args)
+        self.out.lines.append(f"rt.kink({self.keep(term)}, {numbers}, ({found}))")
 
     def dynamic(self, expression: str, inexact: bool, movers: tuple[Known, ...]) -> Dynamic:
         return Dynamic(self.out.let(expression, "d"), inexact or self.out.rounding, self.moves(movers))
@@ -269,9 +279,11 @@ class Writer:
     def side(self, term: Branch) -> tuple[str, str]:
         """The mask of a branch, forced or as it falls, and nan wherever its surface is nan (None where nowhere)."""
         mask, spoiled = self.out.name("m"), self.out.name("z")
-        surface = self.number(term.surface).v
+        surface = self.number(term.surface)
+        if self.watching and any(surface.t):
+            self.watch(term, f"(({surface.v}, {surface.e or ZERO}), )", (surface,))
         self.out.lines.append(f"{mask} = {self.trace(term, 2)}; {spoiled} = None")
-        self.out.lines.append(f"if {mask} is None: {mask}, {spoiled} = rt.falls({surface}, {term.strict})")
+        self.out.lines.append(f"if {mask} is None: {mask}, {spoiled} = rt.falls({surface.v}, {term.strict})")
         return mask, spoiled
 
     def select(self, mask: str, term: If | Branch) -> Known:

@@ -323,11 +323,15 @@ class _Run:
         values = [moving[name] if name in moving else pad(value, k) for name, value in self.arguments]
         self.moved = values, machine
         with self.clock:
-            value = in_lists(as_a_whole(machine, self.call.elaborated, lambda own: self.call.value(values, own)))
+            value = in_lists(as_a_whole(machine, self.call.elaborated, tuple(values), self.called))
             if not _numbers(value):
                 raise wrong_call("only a number or a tuple of numbers has a gradient")
             with np.errstate(all="ignore"):
                 return ended(pad(value, k))
+
+    def called(self, machine: Machine, values: Value) -> Value:
+        assert isinstance(values, tuple)
+        return self.call.value(values, machine)
 
     def own(self, name: str) -> Value:
         """What a parameter is given. Raises PottoError if that is nothing."""

@@ -44,13 +44,13 @@ def hoisted(term: Integral, resolve: Resolve) -> Integral:
 
     `resolve` gives the functions that a call may be replaced by: not one that stands for its derivative.
     """
-    term = _split_at_bounds(term, resolve)
+    term = split_at_bounds(term, resolve)
     body = _taken_out(term.body)
     known = carried_out(body, resolve)
     return with_integrand(term, body if known is body else _taken_out(known))
 
 
-def _split_at_bounds(term: Integral, resolve: Resolve) -> Integral:
+def split_at_bounds(term: Integral, resolve: Resolve) -> Integral:
     """An integral whose bounds jump with its own variables as one inside the other."""
     for level in range(1, len(term.variables)):
         outer = set(term.variables[:level])

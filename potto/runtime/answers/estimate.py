@@ -60,12 +60,14 @@ class OneSided(Struct, frozen=True):
         place = f"lies on a bound of `{self.variable}`" if self.other is None else f"coincides with {self.other}"
         if self.surface is None:
             which, place = "surfaces", f"run along `{self.variable}`"
-        elif self.kink or self.along:
+        elif self.kink or self.along or not self.variable:
             which = f"the {'kink' if self.kink else 'surface'} {self.surface}"
             place = f"lies all along `{self.variable}`" if self.along else "is just here"
         elif self.fold:
             place = f"folds along `{self.variable}`"
         backward, forward = _number(self.backward, self.backward_error), _number(self.forward, self.forward_error)
+        if np.isnan([self.backward, self.forward]).all():
+            return f"{which} {place}: the one-sided derivatives are not known"
         if np.array_equal(self.backward, self.forward, equal_nan=True):
             return f"{which} {place}: the derivative does not exist ({forward})"
         return f"{which} {place}: the one-sided derivatives differ ({backward} backward, {forward} forward)"

@@ -38,7 +38,11 @@ def call_derivative(
     dual_groups = tuple(
         tuple(merge(arg) for arg in fit(group, arity)) for group, arity in zip(groups, arities, strict=False)
     )
-    value = split(as_a_whole(carrying, primal.lam, lambda own: own.call(primal.padded(1), dual_groups, trace)))
+
+    def called(own: Machine, given: Value) -> Value:
+        return own.call(primal.padded(1), given, trace)  # type: ignore[arg-type]
+
+    value = split(as_a_whole(carrying, primal.lam, dual_groups, called))
     return compared(machine, function.primal, groups, value) if isinstance(function.primal, Derivative) else value
 
 

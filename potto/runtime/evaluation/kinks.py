@@ -1,6 +1,7 @@
-"""Kinks of builtins, outside of integrals, just at the parameters: both derivatives are told.
+"""Kinks of builtins, and what jumps, outside of integrals, just at the parameters: both derivatives are told.
 
-Owns `note_kink`. What an answer has is the derivative to one side, as the partial derivatives of the builtin choose it.
+Owns `note_kink`. What an answer has is the derivative to one side, as the partial derivatives of the builtin choose it,
+or as the condition falls. What a jump changes shows in the whole alone (`sides`).
 """
 
 from __future__ import annotations
@@ -9,22 +10,29 @@ from typing import Any
 
 import numpy as np
 
-from potto.core.terms import Prim, function_of, prim, var
+from potto.core.terms import Branch, Prim, Term, function_of, prim, var
 from potto.integrate.events import OneSidedDerivatives, TwoSided
-from potto.kernels.cells import Array, Cell
+from potto.kernels.cells import Array, Bools, Cell
+from potto.kernels.kinks import places
 from potto.primitives import PRIMITIVES
 from potto.runtime.evaluation.machine import Machine
 
 ROUNDING = 1e-12  # what errors are taken for rounding, in the size of the arguments
 
 
-def note_kink(machine: Machine, term: Prim, kinks: tuple[tuple[Any, Any], ...], args: tuple[Cell, ...]) -> None:
-    """Note the derivatives of a builtin to both sides where one of its kinks is at 0, to rounding."""
+def note_kink(
+    machine: Machine, term: Prim | Branch, kinks: tuple[tuple[Any, Any], ...], args: tuple[Cell, ...]
+) -> None:
+    """Note the derivatives of a builtin to both sides where one of its kinks is at 0, to rounding; and that there is a
+    jump where one is."""
     near = [np.abs(u) <= np.minimum(e, ROUNDING * sum(np.abs(arg.v) for arg in args)) for u, e in kinks]
     number = next((i for i, there in enumerate(near) if np.any(there)), None)
     if number is None or machine.frozen:
         return
-    cause = TwoSided("", PRIMITIVES[term.op].kinks(*term.args)[number], kink=True)
+    if isinstance(term, Branch) or PRIMITIVES[term.op].steps(*term.args):
+        surface = term.surface if isinstance(term, Branch) else places(term)[number]
+        return _note_jump(machine, surface, np.any(near, axis=0), args)
+    cause = TwoSided("", places(term)[number], kink=True)
     if any(edge.cause == cause for edge in machine.record.edges):
         return
     (backward, before), (forward, beyond) = (_on_side(machine, term, args, side) for side in (-1, 1))
@@ -32,6 +40,18 @@ def note_kink(machine: Machine, term: Prim, kinks: tuple[tuple[Any, Any], ...], 
     if differ.any():
         sides = (np.where(differ.any(axis=0), side, np.nan) for side in (backward, forward, before, beyond))
         machine.record.edges.append(OneSidedDerivatives(cause, *sides))
+
+
+def _note_jump(machine: Machine, surface: Term, near: Bools, args: tuple[Cell, ...]) -> None:
+    """Note where what is at a jump moves: derivatives that nobody knows by the jump alone."""
+    tapes = machine.taping and any(arg.t[0] is not None for arg in args)
+    rows = [[x for arg in args if (x := arg.t[d]) is not None] for d in range(machine.directions)]
+    moves = np.array([near & (tapes | np.any([np.broadcast_to(x != 0, near.shape) for x in row], axis=0))
+                      if row else np.zeros_like(near) for row in rows])  # fmt: skip
+    cause = TwoSided("", surface)
+    if moves.any() and not any(edge.cause == cause for edge in machine.record.edges):
+        unknown = np.where(moves, np.nan, 0.0)
+        machine.record.edges.append(OneSidedDerivatives(cause, unknown, unknown, unknown, unknown))
 
 
 def _on_side(machine: Machine, term: Prim, args: tuple[Cell, ...], side: int) -> tuple[Array, Array]:

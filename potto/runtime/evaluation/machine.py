@@ -82,7 +82,7 @@ class Semantics:
     data: Callable[[Data], Value]
     fold: Callable[[Machine, Fold, Value, Value, Value, dict[str, Value]], Value]
     integral: Callable[[Machine, Integral, dict[str, Value]], Value]
-    kink: Callable[[Machine, Prim, tuple[tuple[Any, Any], ...], tuple[Cell, ...]], None]
+    kink: Callable[[Machine, Prim | Branch, tuple[tuple[Any, Any], ...], tuple[Cell, ...]], None]
 
 
 @dataclass
@@ -341,8 +341,8 @@ class Machine:
         bad = np.isnan(surface)
         return mask, (np.where(bad, np.nan, 0.0) if bad.any() else None)
 
-    def kink(self, term: Prim, kinks: tuple[tuple[Any, Any], ...], args: tuple[Cell, ...]) -> None:
-        """Note that a builtin stands at one of its kinks, if it does. kinks: what is 0 there, with errors."""
+    def kink(self, term: Prim | Branch, kinks: tuple[tuple[Any, Any], ...], args: tuple[Cell, ...]) -> None:
+        """Note that a term stands at one of its kinks, or jumps, if it does. kinks: what is 0 there, with errors."""
         for u, e in kinks:
             if np.any(np.abs(u) <= e):
                 return self.semantics.kink(self, term, kinks, args)

@@ -6,38 +6,52 @@ what differs in a part may be the same in the whole, as at t = 1 of abs(t - 1)^3
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
 
 from potto.calculus.surfaces.trace import spine
 from potto.core.terms import App, Integral, Lam, Term
+from potto.diagnostics import PottoError
 from potto.integrate.events import OneSidedDerivatives, TwoSided
-from potto.kernels.cells import Array, Cell, Value, all_cells, map_cells, pad
+from potto.kernels.cells import Array, Cell, Number, Value, all_cells, map_cells, pad
+from potto.runtime.evaluation.beside import SAME as ALIKE
+from potto.runtime.evaluation.beside import led_to, moved, one_direction, parameter_step, steps
 from potto.runtime.evaluation.linker import Linker
 from potto.runtime.evaluation.machine import Machine
 
 DEEPEST = 20  # definitions that a call may lead through
+Run = Callable[[Machine, Value], Value]
 SAME = 1e-12  # how far apart the derivatives on both sides may be beside their errors, as a part of them
 
 
-def as_a_whole(machine: Machine, term: Term, run: Callable[[Machine], Value]) -> Value:
-    """What `run` gives for a machine, the value of a term or what the functions that it is give. Where parts have two
-    derivatives, those of the whole on both sides are found: if they are the same, that is the derivative, else the
-    nearer one is, and a note tells them.
+def as_a_whole(machine: Machine, term: Term, given: Value, run: Run) -> Value:
+    """What `run` gives for a machine and what is given, the value of a term or what the functions that it is give.
+    Where parts have two derivatives, those of the whole on both sides are found: if they are the same, that is the
+    derivative, else the nearer one is, and a note tells them.
     """
     record = machine.record
     known = len(record.edges)
-    value = run(machine)
+    value = run(machine, given)
     met = record.edges[known:]
     within = all(edge.cause.variable for edge in met)  # what an integral has met, none of the numbers that it is given
     if not met or machine.side or machine.taping or (within and _one_integral(machine.linker, term)):
         return value
     kept = dict(record.shortfalls), record.edges[:known], record.within
     value = pad(value, machine.directions)
-    sides = [_numbers(pad(run(machine.apart().changed(side=side)), machine.directions)) for side in (-1, 1)]
-    record.shortfalls, record.edges, record.within = kept
+    jumps = [edge for edge in met if edge.cause.jump]
+    try:
+        if jumps:
+            sides = [_led_to(machine, given, run, value, side) for side in (-1, 1)]
+        else:
+            sides = [
+                _numbers(run(machine.apart().changed(side=side), given), machine.directions)[2:] for side in (-1, 1)
+            ]
+    except PottoError:  # a number that counts something: beside it there is nothing
+        return value
+    finally:
+        record.shortfalls, record.edges, record.within = kept
     (backward, before), (forward, beyond) = sides
     with np.errstate(invalid="ignore"):
         near = np.abs(forward - backward) <= SAME * (np.abs(forward) + np.abs(backward)) + before + beyond
@@ -45,10 +59,14 @@ def as_a_whole(machine: Machine, term: Term, run: Callable[[Machine], Value]) ->
         if not same.all():
             where = same.all(axis=(0, 1)) if same.ndim > 2 else np.zeros((), dtype=bool)
             record.edges.append(_note(met[0].cause, where, backward, forward, before, beyond))
-        slopes, _ = _numbers(value)
+        _, _, slopes, off = _numbers(value, machine.directions)
         nearer = np.abs(slopes - backward) < np.abs(slopes - forward)
         t = np.where(same, forward, np.where(nearer, backward, forward))
         et = np.where(same, np.maximum(before, beyond), np.where(nearer, before, beyond))
+        if jumps:  # what is found beside the parameters has fewer digits: enough to know which side it is, or none
+            near = (np.abs(slopes - t) <= off + et + ALIKE * np.abs(t)) & (et <= ALIKE * np.abs(slopes))
+            holds = near | ~np.isfinite(t)
+            t, et = np.where(holds, slopes, t), np.where(holds, off, et)
     rows = iter(zip(t, et, strict=True))
     return map_cells(value, lambda cell: Cell(cell.v, cell.e, *map(tuple, next(rows))))
 
@@ -74,13 +92,30 @@ def _note(cause: TwoSided, left_out: Any, *sides: Array) -> OneSidedDerivatives:
     return OneSidedDerivatives(cause, *(side.reshape(-1, *side.shape[2:]) for side in flat))
 
 
-def _numbers(value: Value) -> tuple[Array, Array]:
-    """The tangents of all numbers of a value, (numbers, directions, …), and how far off they are."""
-    cells = all_cells(value)
+def _led_to(machine: Machine, given: Value, run: Run, value: Value, side: int) -> tuple[Array, Array]:
+    """The tangents of all numbers of a value to a side, (numbers, directions, …), and how far off they may be, as
+    those beside what is given lead to them."""
+    v, e, t, et = _numbers(value, machine.directions)
+    t, et = t.copy(), et.copy()
+    for d in range(machine.directions):
+        step = parameter_step((given,), d)
+        if step is None:
+            continue
+        one, closer = one_direction(given, d), steps(side * step)
+        found = [_numbers(run(machine.apart().with_directions(1), moved(one, h, 0)), 1) for h in closer]
+        t[:, d], et[:, d] = led_to([(a, b, c[:, 0], off[:, 0]) for a, b, c, off in found], (v, e), closer[-1])
+    return t, et
+
+
+def _numbers(value: Value, directions: int) -> tuple[Array, Array, Array, Array]:
+    """All numbers of a value, how far off they are, their tangents, (numbers, directions, …), and how far off those
+    are."""
+    cells = all_cells(pad(value, directions))
     shape = np.broadcast_shapes(*(np.shape(cell.v) for cell in cells))
 
-    def rows(part: str) -> Array:
-        found = [[np.broadcast_to(0.0 if x is None else x, shape) for x in getattr(cell, part)] for cell in cells]
+    def rows(of: Callable[[Cell], Iterable[Number | None]]) -> Array:
+        found = [[np.broadcast_to(0.0 if x is None else x, shape) for x in of(cell)] for cell in cells]
         return np.array(found, dtype=float)
 
-    return rows("t"), rows("et")
+    v, e = rows(lambda cell: (cell.v,)), rows(lambda cell: (cell.e,))
+    return v[:, 0], e[:, 0], rows(lambda cell: cell.t), rows(lambda cell: cell.et)

@@ -13,7 +13,8 @@ from potto.integrate.degenerate.kinks import lying_along
 from potto.integrate.events import BOUNDLESS, INNER, Along, Fold, OneSidedDerivatives, TwoSided
 from potto.integrate.pieces import Sums
 from potto.kernels.cells import Ints
-from potto.runtime.integration.one_sided import beside, parameter_step
+from potto.runtime.evaluation.beside import parameter_step
+from potto.runtime.integration.one_sided import beside
 from potto.runtime.integration.problem import Problem
 
 SAME = 1e-6  # how far apart both derivatives may be beside their errors, as a part of them, if there is but one
@@ -65,7 +66,7 @@ def _noted(problem: Problem, sums: Sums, cause: TwoSided, members: Ints) -> Sums
     sides = np.full((4, sums.t.shape[0], sums.t.shape[1], members.size), np.nan)
     for d in range(problem.machine.directions):
         with problem.among(members) as some:
-            step = parameter_step(some, d)
+            step = parameter_step(some.env.values(), d)
             if step is None or len(problem.term.variables) > MOST_VARIABLES:
                 sides[:, :, d] = 0.0 if step is None else np.nan
                 continue

@@ -19,9 +19,9 @@ from potto.integrate.events import Degenerate, Events, Fold, Shortfall, TwoSided
 from potto.integrate.pieces import Sums
 from potto.kernels.cells import Array, Bools, Ints
 from potto.runtime.answers.convergence import missing, rounded
+from potto.runtime.evaluation.beside import one_direction
 from potto.runtime.integration.attempts import proved_beforehand
 from potto.runtime.integration.choices import orders, preferred
-from potto.runtime.integration.one_sided import one_direction
 from potto.runtime.integration.problem import Problem
 from potto.runtime.integration.quadrature import cut_up, iterated, whole_boxes
 

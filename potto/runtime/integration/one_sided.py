@@ -1,6 +1,6 @@
 """Derivatives that are not the same on the two sides of the parameters.
 
-Owns `on_both_sides`, `at_folds`, `beside_folds`, `beside_axes`, `beside` and `moved`. What surfaces on
+Owns `on_both_sides`, `at_folds`, `beside_folds`, `beside_axes` and `beside`. What surfaces on
 bounds and on one another contribute is known on either side (`integrate/degenerate/coincidences`). Where sections of a
 surface appear or merge just at the parameters they move infinitely fast, and nothing at this place tells the
 derivative: of [x^2 < t] at t = 0 it is 0 on one side and infinite on the other, of [x^2 + y^2 < t] 0 and pi. It is then
@@ -11,7 +11,6 @@ have sections along none.
 from __future__ import annotations
 
 import itertools
-import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
@@ -24,7 +23,8 @@ from potto.integrate.decomposition.sections import searched_rows
 from potto.integrate.events import BOUNDLESS, INNER, Degenerate, Fold, OneSidedDerivatives, TwoSided
 from potto.integrate.pieces import Sums, still
 from potto.integrate.plan import Plan
-from potto.kernels.cells import Array, Cell, Value, all_cells, map_cells
+from potto.kernels.cells import Array, Cell
+from potto.runtime.evaluation.beside import APART, SAME, led_to, moved, moving, parameter_step, steps
 from potto.runtime.evaluation.machine import Machine
 from potto.runtime.integration.attempts import accurate
 from potto.runtime.integration.choices import orders
@@ -33,17 +33,11 @@ from potto.runtime.integration.quadrature import iterated
 
 # The parameters' steps that are tried, and how far apart what folds may be after one, as a part of the range.
 STEPS = 2.0 ** np.arange(-1000.0, 1001.0, 4.0)
-APART = 2.0**-8
-CLOSER = 2.0**-8  # each step by this part of the one before
-# What successive differences may be of the one before where there is a limit, and what is no difference at all.
-SETTLING, SAME = 0.75, 1e-6
-MISSED = 1 / 16  # the least part of what is extrapolated that may be wrong
 # What is nearer to a fold than this lies at it, as far as steps that parameters notice can tell.
 TOGETHER = 1e-9
 # The part of a derivative, or how many errors of the value, its error may be that no other order is tried.
 ROUGH, ROUNDED = 1e-9, 1e4
 GAP = 1e-8  # the part of a derivative from which on it is worth a look whether it has two sides that rounding hides
-LEAP = 1e-9  # the part of a value that is no jump of it
 MOST_MEMBERS = 16  # of a batch that are looked at
 # Member, direction, the derivatives before and behind the parameters, of all components, and how far off each may be.
 Sides = tuple[int, int, Array, Array, tuple[Array, Array]]
@@ -191,18 +185,9 @@ def beside(problem: Problem, d: int, step: float, here: Sums) -> tuple[Array, Ar
 
     here: what there is at the parameters. Where the values beside them lead to another one it is infinite.
     """
-    steps = [step * CLOSER**i for i in range(3)]
-    found = [problem.beside({n: moved(v, h, d) for n, v in problem.env.items()}) for h in steps]
-    values = [np.where(np.isfinite(part.et[:, d]), part.t[:, d], np.nan) for part in found]
-    noise = np.sum([part.et[:, d] for part in found], axis=0)
-    flat = zip(*(x.ravel() for x in (*values, noise)), strict=True)
-    limits, missed = (np.reshape(x, noise.shape) for x in zip(*(_limit(*four) for four in flat), strict=True))
-    missed = np.where(np.isfinite(limits), missed + found[2].et[:, d], 0.0)
-    with np.errstate(invalid="ignore"):
-        leap, change = found[2].v - here.v, np.abs(steps[2]) * (np.abs(limits) + missed)
-        sure = found[2].e + here.e + LEAP * (np.abs(here.v) + np.abs(found[2].v))
-        jumps = np.isfinite(limits) & (np.abs(leap) > 2 * change + sure)
-    return np.where(jumps, np.copysign(np.inf, leap * step), limits), np.where(jumps, 0.0, missed)
+    closer = steps(step)
+    found = [problem.beside({n: moved(v, h, d) for n, v in problem.env.items()}) for h in closer]
+    return led_to([(part.v, part.e, part.t[:, d], part.et[:, d]) for part in found], (here.v, here.e), closer[-1])
 
 
 def _step(problem: Problem, plan: Plan, d: int, where: Fold | None) -> float | None:
@@ -213,7 +198,7 @@ def _step(problem: Problem, plan: Plan, d: int, where: Fold | None) -> float | N
     """
     env, quiet = problem.env, problem.machine.with_directions(0)
     if where is not None and (where.number == INNER or _searched(plan, where)):
-        return parameter_step(problem, d)
+        return parameter_step(env.values(), d)
     both = np.concatenate(([0.0], STEPS, -STEPS))
     here = {n: still(moved(v, both, d)) for n, v in env.items()}
     size = both.size
@@ -247,12 +232,6 @@ def _off(rows: Sequence[Row], low: Array, high: Array, where: Fold | None) -> Ar
     return off
 
 
-def parameter_step(problem: Problem, d: int) -> float | None:
-    """A small part of the parameters that move in a direction; None where none does."""
-    sizes = [float(np.max(np.abs(cell.v))) for value in problem.env.values() for cell in moving(value, d)]
-    return APART**2 * max([1.0, *sizes]) if sizes else None
-
-
 def _searched(plan: Plan, where: Fold) -> bool:
     level = plan.levels[where.number]
     return level.level.cuts[where.cut] in level.searched
@@ -282,41 +261,3 @@ def _near(x: Array) -> Array:
     """Where a root is after the least of the steps after which there is one, in either direction."""
     found = [x[1 + i * STEPS.size + there.argmax()] for i, there in enumerate(~np.isnan(x[1:]).reshape(2, -1))]
     return np.concatenate(([np.nan], *(np.full(STEPS.size, place) for place in found)))
-
-
-def moving(value: Value, d: int) -> list[Cell]:
-    """The numbers in a value that move in a direction."""
-    return [c for c in all_cells(value) if d < len(c.t) and (t := c.t[d]) is not None and np.any(t)]
-
-
-def moved(value: Value, step: float | Array, d: int) -> Value:
-    """A value after so large a step along its tangents in direction d, which it keeps."""
-
-    def after(cell: Cell) -> Cell:
-        t = cell.t[d] if d < len(cell.t) else None
-        return cell if t is None else Cell(cell.v + step * t, cell.e, cell.t, cell.et)
-
-    return map_cells(value, after)
-
-
-def one_direction(value: Value, d: int) -> Value:
-    """A value that moves in direction d alone, as its only one."""
-    return map_cells(value, lambda cell: Cell(cell.v, cell.e, cell.t[d : d + 1], cell.et[d : d + 1]))
-
-
-def _limit(far: float, nearer: float, nearest: float, noise: float) -> tuple[float, float]:
-    """Where three values at steps that shrink lead to, a number, an infinity, or nan where that does not show, and how
-    far off it may be: what is still to come, or what extrapolation may have missed of it."""
-    if not np.isfinite([far, nearer, nearest]).all():
-        return math.nan, 0.0
-    first, second = nearer - far, nearest - nearer
-    rate = min(max(abs(second / first), CLOSER), SETTLING) if first else CLOSER
-    coming = 2 * abs(second) * rate / (1 - rate)
-    if abs(second) <= max(SAME * abs(nearest), noise):
-        return nearest, coming
-    if abs(second) <= SETTLING * abs(first):
-        limit = nearest + second * second / (first - second)
-        zero = abs(limit) <= SAME * (abs(far) + abs(nearer))
-        return (0.0, abs(limit) + coming) if zero else (limit, coming * max(rate, MISSED))
-    grows = first * second > 0 and nearest * second > 0 and abs(first) > SAME * abs(nearest)
-    return (math.copysign(math.inf, nearest) if grows else math.nan), 0.0

@@ -13,4 +13,5 @@ from potto.runtime.evaluation.sides import as_a_whole
 
 def summed(machine: Machine, term: Term, env: dict[str, Value]) -> Value:
     """The value of the sum that an integral is equal to, with the derivatives of the whole."""
-    return as_a_whole(machine, term, lambda own: own.evaluate(function_of(term), env, None))
+    function, given = function_of(term), tuple(env[name] for name in sorted(term.free))
+    return as_a_whole(machine, term, given, lambda own, values: own.run(function, list(values), None))  # type: ignore[arg-type]
