@@ -57,6 +57,8 @@ CASES: list[tuple[str, Callable[[Any], Any]]] = [
      at_roots(lambda x, a: x**3 - x - a, lambda x, a: mp.exp(x), [(-1, -0.6), (-0.5, 0), (0.8, 1.5)])),
     ("integral [1.5, -1] delta(x^3 - x - a)*[x < a] d(x)",
      at_roots(lambda x, a: x**3 - x - a, lambda x, a: -1, [(-1, -0.6), (-0.5, 0)])),
+    ("integral ([0, 1], [[x >= 0.3]*0.1, a]) [y^2 >= 0.001*a]*delta(y - x^2) d(x, y)",
+     lambda a: mp.mpf("0.3") - (a/1000)**0.25 + mp.sqrt(a) - mp.sqrt(mp.mpf("0.1"))),
     ("g(a)", at_roots(cubic, lambda x, a: mp.exp(x), ONE)),
     ("curve(a, 0)", at_roots(cubic, lambda x, a: 1, ONE)),
     ("sin(integral [-1, 1] delta(x^3 + x - a) d(x))",

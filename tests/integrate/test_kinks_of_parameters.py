@@ -91,6 +91,19 @@ KINKS = [
     ("integral [0, 1] [x*t <= 2*t] d(x)", 0.0, math.inf, 0),
     (f"{UNIT} [(x + y^2)*t <= 0]*y d(x, y)", 0.0, 0, -math.inf),
     ("integral [0, 1] exp(integral [0, 1] [x*y*t <= 0]*y d(y)) d(x)", 0.0, 0, -math.inf),
+    # and so where parameters alone decide it
+    ("if t <= 0.7 then 1 else 2", 0.7, 0, math.inf),
+    ("if t < 0.7 or t > 0.9 then t else 3*t", 0.7, math.inf, 3),
+    ("if t <= 0.7 then t^2 else 0.49", 0.7, 1.4, 0),
+    ("[t <= 0.7]", 0.7, 0, -math.inf),
+    ("2*floor(t) + t", 1.0, math.inf, 1),
+    ("sum k in 1..3 ([k*t <= 1.4]*t)", 0.7, 2, -math.inf),
+    ("if (integral [0, 1] [x < t] d(x)) <= 0.7 then 1 else 2", 0.7, 0, math.inf),
+    ("integral [0, 1] [y <= 0.3]*(if t <= 0.7 then 1 else 2) d(y)", 0.7, 0, math.inf),
+    ("integral [0, 1] (if t <= 0.7 then x else x*t/0.7) d(x)", 0.7, 0, 5 / 7),
+    ("integral [0, 1] [max(y, t) <= 0.7] d(y)", 0.7, 0, -math.inf),
+    ("integral [0, 1] (integral [0, 1] [x + y <= 1]*[t <= 0.7] d(x)) d(y)", 0.7, 0, -math.inf),
+    (f"{CUBE} [max(x, y, t) <= 0.7]*z d(x, y, z)", 0.7, 0, -math.inf),
 ]  # fmt: skip
 
 
@@ -133,6 +146,8 @@ def test_the_other_way_the_sides_are_turned_round(program: str) -> None:
     ("integral [0, 1] [x*t <= 0 or x < 2] d(x)", 0.0, 0.0),
     (f"{HALF} ([x > t] + [x > 2*t*y]) d(x, y)", 0.0, -2.0),
     ("abs(0*t) + t", 0.0, 1.0),
+    ("if t <= 0.7 then t^2 else 1.4*t - 0.49", 0.7, 1.4),
+    ("if t < 0 then 2*t - 1 else 2*[t >= 0] - 3 + 2*t", 0.0, 2.0),
     ("integral [0, 1] (max(x*t, 0) + min(x*t, 0)) d(x)", 0.0, 0.5),
     ("integral [0, 1] abs(x - t) d(x)", 0.25, -0.5),
     (f"{SQUARE} abs(x + y - t)*[x < 0] d(x, y)", 0.0, 1.0),

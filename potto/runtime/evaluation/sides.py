@@ -65,8 +65,8 @@ def as_a_whole(machine: Machine, term: Term, given: Value, run: Run) -> Value:
         et = np.where(same, np.maximum(before, beyond), np.where(nearer, before, beyond))
         if jumps:  # what is found beside the parameters has fewer digits: enough to know which side it is, or none
             near = (np.abs(slopes - t) <= off + et + ALIKE * np.abs(t)) & (et <= ALIKE * np.abs(slopes))
-            holds = near | ~np.isfinite(t)
-            t, et = np.where(holds, slopes, t), np.where(holds, off, et)
+            holds, endless = near | ~np.isfinite(t), np.isinf(backward) & np.isinf(forward)
+            t, et = np.where(holds, slopes, t), np.where(endless, np.inf, np.where(holds, off, et))
     rows = iter(zip(t, et, strict=True))
     return map_cells(value, lambda cell: Cell(cell.v, cell.e, *map(tuple, next(rows))))
 
