@@ -9,11 +9,10 @@ from __future__ import annotations
 
 from itertools import groupby, product
 
-from potto.core.simplify import simplify
+from potto.core.normal_form import normal_form
 from potto.core.terms import (
     ONE,
     Branch,
-    Const,
     If,
     Prim,
     Term,
@@ -116,8 +115,8 @@ def _holds(condition: Term) -> bool:
         case Prim(op="and", args=args):
             return all(map(_holds, args))
         case Prim(op="lt" | "le" as op, args=(a, b)):
-            gap = simplify(sub(b, a))
-            return isinstance(gap, Const) and (gap.value > 0 or (op == "le" and gap.value == 0))
+            gap = normal_form(sub(b, a))  # exact: no double is 0.05 + 0.1
+            return (not gap and op == "le") or (gap.keys() == {()} and gap[()] > 0)
         case _:
             return False
 

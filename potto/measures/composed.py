@@ -16,6 +16,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from potto.core.terms import (
+    INF,
     ONE,
     ZERO,
     Const,
@@ -27,6 +28,7 @@ from potto.core.terms import (
     fresh,
     integral,
     mul,
+    neg,
     prim,
     sub,
     sum_,
@@ -167,7 +169,7 @@ def _cut(part: Part, lo: Term, hi: Term) -> Part:
     low, high = part.support
     if part.discrete:
         lo, hi = _whole("ceil", lo), _whole("floor", hi)
-    inside = _end("max", low, lo, -math.inf), _end("min", high, hi, math.inf)
+    inside = _end("max", low, lo, neg(INF)), _end("min", high, hi, INF)
     holds = "le" if part.discrete else "lt"
     return replace(part, support=inside, valid=(*part.valid, (prim(holds, *inside), "truncated: nothing is left")))
 
@@ -177,11 +179,11 @@ def _whole(op: str, end: Term) -> Term:
     return end if isinstance(end, Const) and (math.isinf(end.value) or end.value.is_integer()) else prim(op, end)
 
 
-def _end(op: str, own: Term, other: Term, nowhere: float) -> Term:
+def _end(op: str, own: Term, other: Term, nowhere: Term) -> Term:
     """The inner one of two ends; an infinite one says nothing."""
-    if isinstance(own, Const) and own.value == nowhere:
+    if own is nowhere:
         return other
-    if isinstance(other, Const) and other.value == nowhere:
+    if other is nowhere:
         return own
     if isinstance(own, Const) and isinstance(other, Const):
         return (max if op == "max" else min)(own, other, key=lambda end: end.value)

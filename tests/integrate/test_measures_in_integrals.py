@@ -101,11 +101,16 @@ def test_by_samples(measure: str, names: tuple[str, ...], cdf: Cdf, values: tupl
             assert abs(mp.mpf(float(moved)) - mp.diff(cdf, tuple(exact), order)) <= 5 * moved.error + 1e-9
 
 
-def test_a_range_around_a_variable_far_out() -> None:
-    """At nodes where x + 1 is x to rounding there is a range all the same: E(x + 1/2) = t + 1/2."""
-    f = potto.compile("def f(t) integral (x ~ normal(t, 0.1)) (integral (y ~ uniform(x, x + 1)) y d(y)) d(x)").f
+@pytest.mark.parametrize(("measure", "mean"), [
+    ("uniform(x, x + 1)", 0.5),
+    ("truncated(normal(x, 0.1), x - 0.1, x + 0.05)",
+     float(0.1*(mp.npdf(-1) - mp.npdf(0.5))/(mp.ncdf(0.5) - mp.ncdf(-1)))),
+])  # fmt: skip
+def test_a_range_around_a_variable_far_out(measure: str, mean: float) -> None:
+    """At nodes where x + 1 is x to rounding there is a range all the same: its mean is t and a number."""
+    f = potto.compile(f"def f(t) integral (x ~ normal(t, 0.1)) (integral (y ~ {measure}) y d(y)) d(x)").f
     answer = potto.deriv(f)((0.5, 1.0))
-    assert answer.converged and abs(answer.value - 1.0) <= answer.error < 1e-12
+    assert answer.converged and abs(answer.value - 0.5 - mean) <= answer.error < 1e-12
     assert abs(answer.tangent - 1.0) <= answer.tangent_error < 1e-11
 
 
