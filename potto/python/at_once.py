@@ -11,8 +11,9 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Literal
 
+import numpy as np
 from msgspec import Struct
-from msgspec.structs import asdict
+from msgspec.structs import asdict, replace
 
 from potto.core.terms import Lam
 from potto.integrate.costs import wanted
@@ -74,26 +75,27 @@ class AtOnce(Struct, frozen=True, eq=False):
     dual: bool
 
     def answer(self, args: tuple[Any, ...], settings: Settings) -> Estimate | None:
-        """The estimate; None where only the general way has it."""
+        """The estimate; None where only the general way has it. Arrays of one member cost what numbers cost."""
         start = time.perf_counter()
         if len(args) != len(self.reads) or settings != self.settings or _looked_at():
             return None
-        env: dict[str, Cell] = {}
-        for read, arg in zip(self.reads, args, strict=True):
-            if arg.__class__ is float and read.kind == "number":  # as most are
-                env[read.name] = Cell(arg, None, read.t, read.et)
-                continue
-            value = read.of(arg)
-            if value is None:
-                return None
-            env[read.name] = value
-        found = self.settled.at(env)
+        env, axes = self._env(args), 0
+        if env is None:
+            numbers, axes = _numbers(args)
+            env = self._env(numbers) if axes else None
+        found = None if env is None else self.settled.at(env)
         if found is None:
             return None
-        number, error, rtol = found.number, found.error, settings.rtol
+        number: Sequence[Any] = found.number
+        error: Sequence[Any] = found.error
+        rtol = settings.rtol
         for x, e in zip(number, error, strict=True):
             if not e <= rtol * abs(x):
                 return None
+        every: Any = None
+        if axes:
+            number, error = [[np.array(x, ndmin=axes) for x in row] for row in (number, error)]
+            every = np.array(True, ndmin=axes)
         first: tuple[Any, ...] = (None, None)
         rest: tuple[Any, ...] = ()
         if self.dual:
@@ -104,7 +106,41 @@ class AtOnce(Struct, frozen=True, eq=False):
             rest = (self.wrt,)
         seconds = time.perf_counter() - start
         return self.made(number[0], error[0], *first, True, found.nodes, seconds, 0.0, "quadrature", (),
-                         dict(self.stats), None, None, {}, *rest)  # fmt: skip
+                         dict(self.stats), None, every, {}, *rest)  # fmt: skip
+
+    def _env(self, args: tuple[Any, ...]) -> dict[str, Cell] | None:
+        """The numbers as the integral takes them; None where one is of another kind than those of before."""
+        env: dict[str, Cell] = {}
+        for read, arg in zip(self.reads, args, strict=True):
+            if arg.__class__ is float and read.kind == "number":  # as most are
+                env[read.name] = Cell(arg, None, read.t, read.et)
+                continue
+            value = read.of(arg)
+            if value is None:
+                return None
+            env[read.name] = value
+        return env
+
+
+def _numbers(args: tuple[Any, ...]) -> tuple[tuple[Any, ...], int]:
+    """Arguments with numbers for arrays of one member, and how many axes these have: the most, 0 if there are none."""
+    axes, numbers = 0, []
+    for arg in args:
+        own = 0
+        if arg.__class__ is np.ndarray and arg.size == 1 and arg.dtype.kind in "fiu":
+            own, arg = arg.ndim, float(arg.item())
+        elif arg.__class__ is tuple:
+            arg, own = _numbers(arg)
+        axes = max(axes, own)
+        numbers.append(arg)
+    return tuple(numbers), axes
+
+
+def _number(part: Any) -> Any:
+    """A part of an answer over arrays of one member as a number."""
+    if isinstance(part, tuple):
+        return tuple(map(_number, part))
+    return part.item() if isinstance(part, np.ndarray) and part.size == 1 else part
 
 
 def at_once(
@@ -114,8 +150,14 @@ def at_once(
     """What a call takes that has just been answered, for numbers near these; None where the general way is needed.
 
     args, values: the arguments, as they were given, and with their tangents. machine: that for this many tangents.
-    found: the answer, by `wrt`.
+    found: the answer, by `wrt`; over a batch, if that has one member.
     """
+    args, axes = _numbers(args)
+    if axes:
+        parts = map(_number, (found.value, found.error, found.tangent, found.tangent_error))
+        value, error, tangent, tangent_error = parts
+        found = replace(found, value=value, error=error, tangent=tangent, tangent_error=tangent_error,
+                        member_converged=None)  # fmt: skip
     if not len(term.params) == len(values) == len(args) or not found.converged or _looked_at():
         return None
     direct = program.shortest(term.body)

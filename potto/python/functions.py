@@ -107,7 +107,7 @@ class Function(Travelling):
         if kinds and given == asked:
             self._fitting[kinds] = self._world.db.revision
         found = in_tiles(self, given, (), arguments, batch)
-        if batch.shape is None and len(asked) == 1 and not asked[0][1]:
+        if batch.size == 1 and len(asked) == 1 and not asked[0][1]:
             self._call(given).keep(asked[0][0], [value for _, value in arguments], found)
         return found
 

@@ -204,7 +204,7 @@ def gradient(call: Call, arguments: Sequence[tuple[str, Value]], wrt: tuple[str,
     run = _Run(call, arguments, batch, {})
     value = run.along_each(wrt)
     found = run.gradient(value, value, wrt)
-    if batch.shape is None:
+    if batch.size == 1:
         run.keep(found, wrt)
     return found
 

@@ -44,7 +44,7 @@ class TermFunction:
         given, batch = self._given(args)
         values = [value for _, value in given]
         found = self._call.run(values, batch)
-        if batch.shape is None:
+        if batch.size == 1:
             self._call.keep(args, values, found)
         return found
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import math
 import warnings
+from collections.abc import Callable
 from typing import Any
 
 import mpmath as mp
@@ -98,14 +99,19 @@ def test_the_general_way_gives_the_same(monkeypatch: pytest.MonkeyPatch) -> None
         assert (found.converged, found.notes) == (general.converged, general.notes)
 
 
+@pytest.mark.parametrize("shape", [None, (1, 1)])
 @pytest.mark.parametrize("backend", BACKENDS)
-def test_calls_near_those_of_before_are_answered_the_same(backend: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Through corners, edges of the domain and far away, back and forth, so that what is known is used and left."""
+def test_calls_near_those_of_before_are_answered_the_same(
+    backend: str, shape: tuple[int, ...] | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Through corners, edges of the domain and far away, back and forth, so that what is known is used and left; with
+    numbers, and with arrays of one."""
     module = potto.compile(RENDERER)
     random = np.random.default_rng(5)
     near = [c + d for c in (-0.7, -1.3, 0.4) for d in (0.0, 1e-3, -1e-3, 1e-9)]
     places = [*near, -1.0, -1 + 1e-9, 0.0, -1e-9, -2.0, -2 + 1e-7, 5.0, -5.0, 1e8, *random.uniform(-2.2, 0.4, 20)]
-    calls = [
+    given = places * 2 if shape is None else [np.full(shape, c) for c in places * 2]
+    calls: list[Callable[[Any], potto.Estimate]] = [
         lambda c: module.f(c),
         lambda c: potto.grad(module.f)(c),
         lambda c: potto.grad(module.two, ("b", "a"))(-c, 0.5),
@@ -117,7 +123,7 @@ def test_calls_near_those_of_before_are_answered_the_same(backend: str, monkeypa
 
     def told(found: potto.Estimate) -> tuple[object, ...]:
         return (type(found), repr((found.value, found.error, found.tangent, found.tangent_error)), found.method,
-                found.converged, list(map(str, found.notes)), found.evals)  # fmt: skip
+                found.converged, repr(found.member_converged), list(map(str, found.notes)), found.evals)  # fmt: skip
 
     answer, answered = AtOnce.answer, []
 
@@ -128,14 +134,14 @@ def test_calls_near_those_of_before_are_answered_the_same(backend: str, monkeypa
 
     with potto.settings(backend=backend):
         for call in calls:
-            for c in places * 2:
+            for c in given:
                 call(c)
             with monkeypatch.context() as patch:
                 patch.setattr(AtOnce, "answer", spied)
-                found = [told(call(c)) for c in places]
+                found = [told(call(c)) for c in given[: len(places)]]
             with monkeypatch.context() as patch:
                 patch.setattr(Call, "at_once", lambda *_: None)
-                assert found == [told(call(c)) for c in places]
+                assert found == [told(call(c)) for c in given[: len(places)]]
     assert sum(answered) >= 25 and not all(answered)
 
 
