@@ -242,3 +242,17 @@ def test_members_with_several_plans_all_of_which_are_0() -> None:
         integral [0, cosh(1) + sinh(sin(s))] [x + 1.83*[max(x, 0.7*s) < s] <= s]*[max(x, 0.7*t) - t < 0.2] d(x)""").f
     answer = potto.deriv(f)((np.array([0.375, -1.0, -1.0]), np.ones(3)), (np.array([-1.0, -1.0, -0.8]), np.ones(3)))
     assert not answer.value.any() and not answer.tangent.any()
+
+
+def test_a_surface_folds_under_a_variable_that_is_eliminated() -> None:
+    """It crashed, where evaluations are so few that variables go one by one. 0.7 S(1), with S(t) = 2 sinh(t)/t; below
+    t = 1 the stretch t < y < 1 comes in."""
+    f = potto.compile("""def f(t) integral ([0, 1], [-1, 1], z ~ exponential(2))
+        [x + [y > t] >= 0.3*t]*exp(-y*t) d(x, y, z)""").f
+    with potto.settings(max_evals=20_000):
+        answer = potto.deriv(f)((1.0, 1.0))
+    above = -0.6 * math.sinh(1) + 1.4 * (math.cosh(1) - math.sinh(1))
+    assert abs(answer.value - 1.4 * math.sinh(1)) <= answer.error <= 1e-9
+    (note,) = answer.notes
+    assert abs(note.forward - above) <= note.forward_error <= 1e-9
+    assert abs(note.backward - above + 0.3 / math.e) <= note.backward_error <= 1e-9

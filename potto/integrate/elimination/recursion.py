@@ -198,7 +198,7 @@ def one_by_one(
                 return None
             continue
         # As one inside another: how much each may err is measured by the largest of all.
-        inside = replace(plan, levels=(*plan.levels, *plan.levels))
+        inside = replace(plan, levels=(state, *plan.levels))
         iteration = _Tabled(inside, fine, START_ORDER, tracked=True, further=further)
         further = _table(iteration, state, span, fine, env)
         if further is None or fine.exhausted() or (isinstance(below, Table) and not below.seen):
@@ -209,8 +209,8 @@ def one_by_one(
 def _table(
     iteration: Iteration, state: LevelPlan, span: tuple[float, float], machine: Any, env: dict[str, Value]
 ) -> Table | None:  # fmt: skip
-    ends = {LOW: Cell(span[0]), HIGH: Cell(span[1])}
-    found, _ = iteration.cut(state, {**env, **ends}, 1, machine, np.zeros(1, dtype=np.int64))
+    env = {**env, LOW: Cell(span[0]), HIGH: Cell(span[1])}
+    found, _ = iteration.cut(state, env, 1, machine, np.zeros(1, dtype=np.int64))
     segments = found.segments
     size = np.fmin(np.maximum(np.abs(segments.a), np.abs(segments.b)), FARTHEST)
     segments = segments.pick(segments.b - segments.a > SLIVER * EPS * size)  # a span is rounded outwards
