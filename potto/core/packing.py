@@ -24,7 +24,7 @@ from potto.core.walking import unknown
 from potto.diagnostics import KINDS, Kind
 
 _TUPLE, _LIST, _SET, _DICT, _TERM, _STRUCT, _KIND, _FRACTION, _INTEGER = range(9)
-_PLAIN = (type(None), bool, float, str, bytes)
+_PLAIN = frozenset((type(None), bool, float, str, bytes))
 _LARGEST = 2**63
 
 
@@ -74,47 +74,54 @@ class _Writer:
     def __init__(self) -> None:
         self.kinds: list[str] = []
         self.rows: list[list[Any]] = []
-        self.numbers: dict[type, int] = {}
+        self.shapes: dict[type, tuple[int, tuple[str, ...]]] = {}
         self.terms: dict[Any, int] = {}
 
     def kind(self, cls: type) -> int:
-        number = self.numbers.get(cls)
-        if number is None:
-            name = f"{cls.__module__}:{cls.__qualname__}"
-            try:
-                found: object = _named(name)
-            except (LookupError, AttributeError, ImportError):
-                found = None
-            if found is not cls:
-                raise TypeError(f"{name} is not found by its name")
-            number = self.numbers[cls] = len(self.kinds)
-            self.kinds.append(name)
-        return number
+        name = f"{cls.__module__}:{cls.__qualname__}"
+        try:
+            found: object = _named(name)
+        except (LookupError, AttributeError, ImportError):
+            found = None
+        if found is not cls:
+            raise TypeError(f"{name} is not found by its name")
+        self.kinds.append(name)
+        return len(self.kinds) - 1
 
-    def term(self, term: Any) -> int:
-        """The number of a term, after those of its subterms."""
-        if term not in self.terms:
+    def term(self, term: Any) -> list[Any]:
+        """A term by its number, after those of its subterms."""
+        number = self.terms.get(term)
+        if number is None:
             for node in unknown(term, self.terms):
-                cls = type(node)
-                row = [self.kind(cls), *(self.value(getattr(node, name)) for name in own_fields(cls))]
-                self.terms[node] = len(self.rows)
-                self.rows.append(row)
-        return self.terms[term]
+                self.rows.append(self.fields(node))
+                number = self.terms[node] = len(self.terms)
+        return [_TERM, number]
+
+    def fields(self, value: Any) -> list[Any]:
+        cls = type(value)
+        shape = self.shapes.get(cls)
+        if shape is None:
+            names = own_fields(cls) if issubclass(cls, Base) else cls.__struct_fields__
+            shape = self.shapes[cls] = self.kind(cls), names
+        number, names = shape
+        return [number, *[self.value(getattr(value, name)) for name in names]]
 
     def value(self, value: Any) -> Any:
         cls = type(value)
         if cls in _PLAIN:
             return value
+        if cls is tuple:
+            return [_TUPLE, *[item if type(item) in _PLAIN else self.value(item) for item in value]]
+        if issubclass(cls, Base):
+            return self.term(value)
         if cls is int:
             return value if -_LARGEST <= value < _LARGEST else [_INTEGER, str(value)]
-        if cls is tuple or cls is list:
-            return [_TUPLE if cls is tuple else _LIST, *map(self.value, value)]
-        if isinstance(value, Base):
-            return [_TERM, self.term(value)]
+        if cls is list:
+            return [_LIST, *map(self.value, value)]
         if cls is Kind:
             return [_KIND, value.code]
-        if isinstance(value, Struct):
-            return [_STRUCT, self.kind(cls), *(self.value(getattr(value, name)) for name in cls.__struct_fields__)]
+        if issubclass(cls, Struct):
+            return [_STRUCT, *self.fields(value)]
         if cls is frozenset:
             return [_SET, *map(self.value, value)]
         if cls is dict:

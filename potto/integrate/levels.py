@@ -1,10 +1,11 @@
 """The variables of an integral before any number: for each its frame, and the surfaces that cut it.
 
-Owns `LevelPlan` and `Group`.
+Owns `LevelPlan` and `Group`, and `group_levels` and `level_plan`, which make them.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
 from typing import Any
 
@@ -12,7 +13,7 @@ from msgspec import Struct
 
 from potto.calculus.decomposition.surface_cuts import Cut
 from potto.calculus.decomposition.sweep import Level
-from potto.core.terms import Lam, function_of, tuple_
+from potto.core.terms import Lam, Term, function_of, neg, prim, tuple_
 
 # What the places are that are no cuts, of which none has a number below 0: hints, and such with which no nodes move.
 HINT, RESTING = -1, -2
@@ -64,3 +65,72 @@ class Group(Struct, frozen=True):
             return True
         jump = self.cut.jumps[0]
         return jump.strict != (jump.orientation > 0)
+
+
+def group_levels(levels: Sequence[Level]) -> tuple[tuple[LevelPlan, ...], tuple[Group, ...]]:
+    """The terms of all variables, outermost first, and the surfaces with jumps that cut them."""
+    groups: list[Group] = []
+    plans: list[LevelPlan] = []
+    for level in levels:
+        decided = []
+        for cut in level.cuts:
+            if cut.decides:
+                decided.append(len(groups))
+                groups.append(Group(len(groups), cut))
+        plans.append(level_plan(level, tuple(decided), groups))
+    return tuple(plans), tuple(groups)
+
+
+def level_plan(level: Level, decided: tuple[int, ...], groups: Sequence[Group]) -> LevelPlan:
+    """The terms of one variable; `decided` are the numbers of the groups among its cuts."""
+    terms: list[Term] = [level.lo, level.hi]
+    rows: list[tuple[int, bool]] = []  # (which cut, HINT or RESTING; whether turning)
+    families: list[tuple[int, Any]] = []
+    searched: list[Cut] = []
+    for number, cut in enumerate(level.cuts):
+        if cut.roots is None:
+            searched.append(cut)
+            continue
+        for root in cut.roots:
+            terms.append(root)
+            rows.append((number, cut.turning))
+        families.extend((number, family) for family in cut.families)
+    for kind, places in ((HINT, level.hints), (RESTING, level.edges)):
+        terms.extend(places)
+        rows.extend((kind, False) for _ in places)
+    deciding, turned = _deciding(decided, groups)
+    surfaces = function_of(tuple_(deciding))
+    return LevelPlan(
+        level,
+        function_of(tuple_(tuple(terms))),
+        tuple(rows),
+        tuple(searched),
+        tuple(families),
+        decided,
+        surfaces,
+        turned,
+    )
+
+
+def _deciding(
+    decided: tuple[int, ...], groups: Sequence[Group]
+) -> tuple[tuple[Term, ...], tuple[tuple[int, ...], ...]]:
+    """Per group what tells the side, and the groups further out whose lower sides turn it round.
+
+    A factor that does not vary with the variable has its side decided where it does: at a node beside the place where
+    it is 0, its own value may be rounding.
+    """
+    known = {g.cut.key: g.number for g in groups}
+    terms: list[Term] = []
+    turned: list[tuple[int, ...]] = []
+    for number in decided:
+        cut = groups[number].cut
+        if cut.product is None:
+            terms.append(cut.surface)
+            turned.append(())
+            continue
+        rest = [f.form for f in cut.product.outer if f.key not in known]
+        term = prim("mul", cut.product.along, *rest) if rest else cut.product.along
+        terms.append(term if cut.product.sign > 0 else neg(term))
+        turned.append(tuple(known[f.key] for f in cut.product.outer if f.key in known))
+    return tuple(terms), tuple(turned)

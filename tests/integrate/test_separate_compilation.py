@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import potto
+from potto.integrate import plan
+from potto.integrate.outline import Outline, outlined
 from potto.kernels import compile as kernels
 
 RENDERER = """
@@ -92,3 +95,23 @@ def test_pixels_of_a_shader_given_take_the_short_way_as_those_of_one_written_out
     for shader, most in ((m.second, 4), (m.first, 0)):
         found = potto.deriv(m.given)((u, 0.0), (v, 0.0), (-0.7, 1.0), potto.deriv(shader))
         assert int(found.stats["kernels compiled"]) <= most
+
+
+def test_a_smooth_shader_finds_bounds_and_cuts_as_they_are(monkeypatch: pytest.MonkeyPatch) -> None:
+    outlines: list[Outline] = []
+
+    def noted(*args: Any) -> Outline:
+        outlines.append(outlined(*args))
+        return outlines[-1]
+
+    monkeypatch.setattr(plan, "outlined", noted)
+    m = potto.compile("""
+def f(t, shader) integral [0, 1] shader x*[x < t] d(x)
+first = \\x . 2*x
+second = \\x . 3*x^2
+jumping = \\x . [x < 0.2]
+""")
+    assert [float(m.f(0.5, shader)) for shader in (m.first, m.second)] == pytest.approx([0.25, 0.125], abs=1e-15)
+    assert len(outlines) == 1
+    assert float(m.f(0.5, m.jumping)) == pytest.approx(0.2, abs=1e-15)
+    assert len(outlines) == 2

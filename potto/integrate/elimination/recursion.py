@@ -45,9 +45,10 @@ from potto.integrate.decomposition.vanishing import vanishing_of
 from potto.integrate.degenerate.degeneracies import BESIDE, does_jump
 from potto.integrate.elimination.interpolants import Table, tabulated
 from potto.integrate.events import Fold, TwoSided
-from potto.integrate.levels import LevelPlan
+from potto.integrate.levels import LevelPlan, group_levels, level_plan
+from potto.integrate.outline import Outline
 from potto.integrate.pieces import Evaluator, Sums, still
-from potto.integrate.plan import Plan, group_levels, level_plan
+from potto.integrate.plan import Plan
 from potto.integrate.rules.gauss import EPS
 from potto.kernels.cells import Array, Cell, Mask, Value, pad
 
@@ -146,7 +147,7 @@ def _planned(
     levels, groups = group_levels(swept.levels)
     numbers = {j.path: (g.number, j.orientation) for g in groups for j in g.cut.jumps}
     vanishing = vanishing_of(body, numbers, weight)
-    plan = Plan(term, levels, groups, function_of(body), vanishing, (), hides=hides)
+    plan = Plan(Outline(term, levels, groups, function_of(body), vanishing, hides))
     places = (f for f in (*steps, *swept.outer) if f.critical is None)
     return plan, tuple((f.surface, f.kind) for f in places if step.state in f.surface.free)
 
@@ -198,7 +199,7 @@ def one_by_one(
                 return None
             continue
         # As one inside another: how much each may err is measured by the largest of all.
-        inside = replace(plan, levels=(state, *plan.levels))
+        inside = replace(plan, outline=replace(plan.outline, levels=(state, *plan.levels)))
         iteration = _Tabled(inside, fine, START_ORDER, tracked=True, further=further)
         further = _table(iteration, state, span, fine, env)
         if further is None or fine.exhausted() or (isinstance(below, Table) and not below.seen):

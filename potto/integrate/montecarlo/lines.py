@@ -14,8 +14,7 @@ from potto.calculus.decomposition.surface_cuts import cut_along
 from potto.calculus.decomposition.sweep import Level
 from potto.core.simplify import simplify
 from potto.core.terms import Integral, Term, add, mul, neg, sub, substitute, var
-from potto.integrate.levels import LevelPlan
-from potto.integrate.plan import level_plan
+from potto.integrate.levels import LevelPlan, level_plan
 from potto.kernels.cells import Array
 
 

@@ -12,6 +12,7 @@ from potto.calculus.inlining.numbers import with_numbers
 from potto.calculus.surfaces.branch_cuts import opened
 from potto.core.terms import Data, Deriv, Global, Integral, Lam, Term, postorder
 from potto.diagnostics import PottoError
+from potto.integrate.outline import Outlines
 from potto.kernels.cells import Pattern, Value
 from potto.kernels.making import counts
 from potto.kernels.written import Kernel
@@ -38,7 +39,7 @@ class Linker:
         self.reach = Reach(lambda name: self.term(name.module, name.name))
         self.alike: dict[Any, Any] = {}
         self.data: dict[Data, Value] = {}
-        self.placed: dict[tuple[Integral, bool], Integral] = {}
+        self.outlines = Outlines()
         self.constants: dict[tuple[str, str, Settings], Value] = {}
         self.duals: dict[tuple[Lam, bool], Lam] = {}
         self.reaches: dict[tuple[Term, ...], tuple[tuple[str, str, bytes], ...]] = {}

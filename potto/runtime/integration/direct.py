@@ -129,7 +129,7 @@ class Direct(Struct, frozen=True):
             if full is not env or met(term, env, reach):
                 return None
             again = machine.directions > 0
-            if placed(term, reach, again) is not term or prepared(term, reach) is not term:
+            if placed(term, again, reach) is not term or prepared(term, reach) is not term:
                 return None
             problem = Problem(machine.apart(), term, *linked(env), solve, 1, True)
             if many(problem):

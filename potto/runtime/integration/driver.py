@@ -59,12 +59,8 @@ def _of_numbers(machine: Machine, term: Integral, env: dict[str, Value]) -> Valu
     """The value of an integral that reads no arrays: made ready, and solved."""
     linker = machine.linker
     derived = linker.reach.deltas(term.body)
-    key = (term, machine.directions > 0)
-    known = linker.placed.get(key)
-    if known is None:
-        with making:
-            known = linker.placed[key] = placed(term, linker.reach, machine.directions > 0)
-    term = known
+    with making:
+        term = placed(term, machine.directions > 0, linker.reach)
     if machine.frozen:
         term, stopped = held(term)
         env = {**env, **{new: pad(still(env[old]), machine.directions) for old, new in stopped}}

@@ -93,7 +93,8 @@ def _spread(term: Term) -> Term:
     return total(spread(term, known), zero_like(term.body))
 
 
-def placed(term: Integral, reach: Reach, again: bool) -> Integral:
+@kept
+def placed(term: Integral, again: bool, reach: Reach) -> Integral:
     """The integral with the calls of definitions that place its deltas carried out: `delta(cond (x, y) c)`. Of a
     derivative under it, of a function that jumps, the deltas count (`_counted`).
 

@@ -20,13 +20,13 @@ from msgspec import Struct
 
 from potto.calculus.algebra.point_values import sample_value
 from potto.calculus.inlining.deciding import deciding
-from potto.core.packing import keep, keeping, packed, recall, unpacked
+from potto.core.packing import keep, keeping, recall
 from potto.core.terms import Deriv, Integral, Lam, Term, Var, deriv, substitute, var
 from potto.diagnostics import PottoError
 from potto.integrate.elimination.recursion import Eliminated, eliminated
 from potto.integrate.events import Events
 from potto.integrate.pieces import Sums, still
-from potto.integrate.plan import Plan, make
+from potto.integrate.plan import Plan, make, unpacked_plan
 from potto.kernels.cells import Array, Bools, Cell, Ints, Value, map_arrays
 from potto.kernels.making import making
 from potto.runtime.evaluation.functions import Closure, Derivative
@@ -86,7 +86,7 @@ def _recalled(key: tuple[object, ...]) -> Known:
     """What an earlier process has found out about an integral; the digests in the key are those of contents."""
     name = repr(key).encode()
     plans = recall("plans", name) or []
-    return Known(name, [unpacked(plan) for plan in plans], plans)
+    return Known(name, [unpacked_plan(plan) for plan in plans], plans)
 
 
 def clear() -> None:
@@ -187,12 +187,13 @@ class Problem:
             if all(self.decided(t) == value for t, value in plan.decisions) and self.fits(plan):
                 return plan
         with making:
-            plan = make(self.term, self.function, self.decided, self.plain_function, _Sampled(self))
+            outlines = self.machine.linker.outlines
+            plan = make(self.term, self.function, self.decided, self.plain_function, _Sampled(self), outlines)
         known.append(plan)
         # Each as it was made: evaluation adds to what a plan knows, in forms that are for this process alone.
         if keeping():
             with suppress(TypeError):  # what is no data is not kept
-                self.known.packed.append(packed(plan))
+                self.known.packed.append(plan.packed())
                 keep("plans", self.known.key, self.known.packed)
         fits = self.fitting(plan)
         if self.batch > 1 and not fits.all():  # to rounding it holds for the one that it was made for
