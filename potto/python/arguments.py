@@ -219,6 +219,25 @@ def numbers_of(args: tuple[Any, ...]) -> list[Value]:
     return [tuple(numbers_of(arg)) if arg.__class__ is tuple else Cell(float(arg)) for arg in args]
 
 
+def without_axes(args: tuple[Any, ...]) -> tuple[tuple[Any, ...], int]:
+    """Arguments with numbers for arrays of one member, and how many axes these have: the most, 0 if there are none."""
+    axes, numbers = 0, []
+    for arg in args:
+        own = 0
+        if arg.__class__ is np.ndarray and arg.size == 1 and arg.dtype.kind in "fiu":
+            own, arg = arg.ndim, float(arg.item())
+        elif arg.__class__ is tuple:
+            arg, own = without_axes(arg)
+        axes = max(axes, own)
+        numbers.append(arg)
+    return tuple(numbers), axes
+
+
+def with_axes(numbers: Iterable[float], axes: int) -> list[Any]:
+    """Numbers as arrays of one member with so many axes."""
+    return [np.array(number, ndmin=axes) for number in numbers]
+
+
 def _double(name: str, argument: Any) -> float:
     try:
         return float(argument)

@@ -11,7 +11,6 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Literal
 
-import numpy as np
 from msgspec import Struct
 from msgspec.structs import asdict, replace
 
@@ -19,7 +18,7 @@ from potto.core.terms import Lam
 from potto.integrate.costs import wanted
 from potto.kernels.cells import Cell, Value
 from potto.projects.settings import Settings
-from potto.python.arguments import LARGEST
+from potto.python.arguments import LARGEST, with_axes, without_axes
 from potto.runtime.answers.estimate import Estimate
 from potto.runtime.evaluate import Clock, Program, stats_of
 from potto.runtime.evaluation.duals import merge
@@ -81,7 +80,7 @@ class AtOnce(Struct, frozen=True, eq=False):
             return None
         env, axes = self._env(args), 0
         if env is None:
-            numbers, axes = _numbers(args)
+            numbers, axes = without_axes(args)
             env = self._env(numbers) if axes else None
         found = None if env is None else self.settled.at(env)
         if found is None:
@@ -94,8 +93,7 @@ class AtOnce(Struct, frozen=True, eq=False):
                 return None
         every: Any = None
         if axes:
-            number, error = [[np.array(x, ndmin=axes) for x in row] for row in (number, error)]
-            every = np.array(True, ndmin=axes)
+            number, error, every = with_axes(number, axes), with_axes(error, axes), with_axes((True,), axes)[0]
         first: tuple[Any, ...] = (None, None)
         rest: tuple[Any, ...] = ()
         if self.dual:
@@ -122,27 +120,6 @@ class AtOnce(Struct, frozen=True, eq=False):
         return env
 
 
-def _numbers(args: tuple[Any, ...]) -> tuple[tuple[Any, ...], int]:
-    """Arguments with numbers for arrays of one member, and how many axes these have: the most, 0 if there are none."""
-    axes, numbers = 0, []
-    for arg in args:
-        own = 0
-        if arg.__class__ is np.ndarray and arg.size == 1 and arg.dtype.kind in "fiu":
-            own, arg = arg.ndim, float(arg.item())
-        elif arg.__class__ is tuple:
-            arg, own = _numbers(arg)
-        axes = max(axes, own)
-        numbers.append(arg)
-    return tuple(numbers), axes
-
-
-def _number(part: Any) -> Any:
-    """A part of an answer over arrays of one member as a number."""
-    if isinstance(part, tuple):
-        return tuple(map(_number, part))
-    return part.item() if isinstance(part, np.ndarray) and part.size == 1 else part
-
-
 def at_once(
     program: Program, term: Lam, args: tuple[Any, ...], values: Sequence[Value], machine: Machine, found: Estimate,
     wrt: tuple[str, ...],
@@ -152,9 +129,9 @@ def at_once(
     args, values: the arguments, as they were given, and with their tangents. machine: that for this many tangents.
     found: the answer, by `wrt`; over a batch, if that has one member.
     """
-    args, axes = _numbers(args)
+    args, axes = without_axes(args)
     if axes:
-        parts = map(_number, (found.value, found.error, found.tangent, found.tangent_error))
+        parts = without_axes((found.value, found.error, found.tangent, found.tangent_error))[0]
         value, error, tangent, tangent_error = parts
         found = replace(found, value=value, error=error, tangent=tangent, tangent_error=tangent_error,
                         member_converged=None)  # fmt: skip
