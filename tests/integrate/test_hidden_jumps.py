@@ -111,3 +111,13 @@ def f(t) integral ([0, 1], [0, 1]) (integral [0, below(4, x, y, t)] 2*z*x d(z)) 
             found = f(t=0.7)
         assert abs(found.value - exact(mp.mpf(0.7))) <= found.error < 0.1
         assert abs(found.tangent - mp.diff(exact, 0.7)) <= found.tangent_error < 0.1
+
+
+def test_surfaces_along_axes_that_take_too_much_are_not_looked_at_beside_the_parameters() -> None:
+    """Each look is an integral of its own, and there is a budget for one: the ends of segments come on top of it."""
+    waves = "[max(x*y, z) < t*sin(3*x) or cos(9*x) + cos(9*y) + cos(9*z) > t]/(1 + 50*(x - y)^2)"
+    f = potto.compile(f"def f(t) integral ([0, 2], [0, x], [0, y]) {waves} d(x, y, z)").f
+    with potto.settings(max_evals=20_000):
+        answer = potto.deriv(f)((0.4, 1.0))
+    assert not answer.converged and answer.tangent_error == math.inf
+    assert answer.evals < 800_000  # 2,000,000 with what is beside

@@ -88,7 +88,7 @@ class PanelBatch(Struct, dict=True):
 
         `whole`: the pieces are the segments.
         """
-        rows = max(1, CHUNK // order)
+        rows = max(1, min(CHUNK, self.machine.max_evals) // order)  # by so much a budget may be overrun
         if p.segment.size > rows:
             return self.in_chunks(p, order, rows)
         rule = gauss(order)

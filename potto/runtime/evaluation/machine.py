@@ -123,6 +123,10 @@ class Machine:
         return self.settings.atol
 
     @property
+    def max_evals(self) -> int:
+        return self.settings.max_evals
+
+    @property
     def backend(self) -> str:
         """What computes at many points; where it is told how surfaces fall (`falls`), numpy."""
         return "numpy" if self.record.second else self.settings.backend

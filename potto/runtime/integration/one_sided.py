@@ -126,7 +126,7 @@ def beside_folds(problem: Problem, plan: Plan, sums: Sums) -> None:
 def beside_axes(problem: Problem, plan: Plan, sums: Sums, variable: str) -> bool:
     """The same where surfaces run along `variable`, and every other one. Whether all derivatives are known then."""
     machine, batch = problem.machine, problem.batch
-    if batch > MOST_MEMBERS:
+    if batch > MOST_MEMBERS or machine.overdrawn():
         return False
     problem.events.forget(Degenerate)
     found = list(_sides(problem, plan, range(batch), None, sums))
