@@ -319,6 +319,8 @@ def _sides(surface: Term, texts: _Texts) -> tuple[str, str, bool]:
     match surface:
         case Prim(op="add", args=(Prim(op="neg", args=(a,)), b)) | Prim(op="add", args=(b, Prim(op="neg", args=(a,)))):
             return texts[a].at(_ADD), texts[b].at(_ADD), False
+        case Prim(op="neg", args=(a,)):
+            return texts[a].at(_ADD), "0", False
         case Prim(op="add", args=(a, Const(value=value, name=None))) if value < 0:
             return _number(-value).text, texts[a].at(_ADD), True
         case _:

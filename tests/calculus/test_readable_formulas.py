@@ -55,6 +55,16 @@ def test_conditions_that_say_nothing_are_not_shown(program: str, conditions: str
     assert "0 = 0" not in shown and "0 >= 0" not in shown and "1 = 0" not in shown
 
 
+def test_what_never_holds_is_not_shown_and_roots_of_decimals_are_decimals() -> None:
+    """A band of the width c/3 around t has one edge above t where c > 0, and none where c < 0."""
+    library = Library()
+    file = library.put("<text>", "def f(t, c) integral [t, t + 1] [abs(x - t) < c/3] d(x)\n"
+                       "def g(t) integral [t, t + 1] [(x - t)^2 < 0.04] d(x)\n")  # fmt: skip
+    shown = explain_derivative(library.db, file, "f").tangent
+    assert shown == "dt*[c/3 > 1] - dt*[c > 0] + (dc/3 + dt)*[c > 0 and c/3 < 1]"
+    assert "t - 0.2" in (found := explain_derivative(library.db, file, "g").tangent) and "sqrt" not in found
+
+
 def test_numbers_are_decimals() -> None:
     """What a computer makes of 0.3 - 0.2 is 0.09999999999999998."""
     library = Library()

@@ -58,10 +58,13 @@ def conditions(term: Term) -> list[Condition] | None:
 
 
 def fewer(known: Iterable[Condition]) -> list[Condition]:
-    """The same conditions without what is said twice or follows from another one."""
+    """The same conditions without what is said twice or follows from another one; of two that exclude each other none
+    is left but that which never holds."""
     found: list[Condition] = []
     for item in known:
         for plain in _plain(item):
+            if any(_excludes(other, plain) for other in found):
+                return [NEVER]
             if not any(_implies(other, plain) for other in found):
                 found = [other for other in found if not _implies(plain, other)]
                 found.append(plain)
@@ -155,9 +158,12 @@ def inside_square(term: Term) -> Term:
 
 def _without_even(item: Condition, top: Polynomial, below: Polynomial) -> list[Condition]:
     """Of a product only the factors that change its sign."""
+    ((monomial, scale),) = top.items()
+    if not item.strict and not set(below) - {()} and len(monomial) == 1 and monomial[0][1] == 1:
+        return [Condition(monomial[0][0] if scale > 0 else neg(monomial[0][0]), False)]
     if len(below) != 1 or not item.strict:
         return [item]
-    ((monomial, scale),), ((under, _),) = top.items(), below.items()
+    ((under, _),) = below.items()
     odd = [a for a, n in (*monomial, *under) if n % 2 and not range_of(a).positive]
     if not odd:
         return [] if scale > 0 else [NEVER]
@@ -165,10 +171,25 @@ def _without_even(item: Condition, top: Polynomial, below: Polynomial) -> list[C
     return [Condition(whole if scale > 0 else neg(whole), item.strict)]
 
 
+def _excludes(first: Condition, second: Condition) -> bool:
+    """Whether two conditions never hold together: their surfaces add up to a number that is not above 0."""
+    total = _number(add(first.surface, second.surface))
+    if total is None:
+        return False
+    return total < 0 or (total == 0 and (first.strict or second.strict))
+
+
 def _implies(first: Condition, second: Condition) -> bool:
     """Whether the second holds wherever the first does: its surface is the other's and a number that is not below 0."""
-    found = normal(sub(second.surface, first.surface))
-    if found is None or not found.whole or set(found.top) - {()}:
+    offset = _number(sub(second.surface, first.surface))
+    if offset is None:
         return False
-    offset = found.top.get((), Fraction(0))
     return offset > 0 or (offset == 0 and (first.strict or not second.strict))
+
+
+def _number(term: Term) -> Fraction | None:
+    """The number that a term is."""
+    found = normal(term)
+    if found is None or not found.whole or set(found.top) - {()}:
+        return None
+    return Fraction(found.top.get((), Fraction(0)))

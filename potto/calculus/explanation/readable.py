@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from fractions import Fraction
-from math import gcd, isfinite, lcm, prod, ulp
+from math import gcd, isfinite, isqrt, lcm, prod, ulp
 
 from msgspec import Struct
 
@@ -93,6 +93,16 @@ def in_decimals(term: Term) -> Term:
     return transform(term, change)
 
 
+def _root(node: Prim) -> Term:
+    """0.2 for the root of 0.04, of which a computer makes 0.2 as well, if not of what it has made of 0.2*0.2."""
+    (inside,) = node.args
+    if not _is_number(inside) or not isinstance(inside, Const) or inside.value < 0:
+        return node
+    square = Fraction(repr(inside.value))
+    root = Fraction(isqrt(square.numerator), isqrt(square.denominator))
+    return const(float(root)) if root * root == square else node
+
+
 def _is_number(term: Term) -> bool:
     return isinstance(term, Const) and term.name is None and isfinite(term.value)
 
@@ -135,6 +145,8 @@ class _Work:
         self.inside = inside  # variables of integration, on which no `sign` may depend
 
     def node(self, node: Term) -> Term:
+        if isinstance(node, Prim) and node.op == "sqrt":
+            node = _root(node)
         match node:
             case Prim(op=op) if op in _ARITHMETIC:
                 key = node, self.tangents, self.inside
