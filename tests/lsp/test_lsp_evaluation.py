@@ -19,6 +19,11 @@ import pytest
 from lsp_client import Client
 from potto_lsp.analysis import Analysis
 from potto_lsp.evaluation import LIVE, Evaluator, Task
+from potto_lsp.evaluator import _answer as answered
+
+from potto.evaluating.world import World
+from potto.kernels import compile as kernels
+from potto.kernels.making import counts
 
 Server = Callable[..., Client]
 Uri = Callable[[str], str]
@@ -59,6 +64,27 @@ def test_evaluate_an_unsaved_text(server: Server, uri: Uri) -> None:
     client.change(uri("main"), 2, {"text": TEXT.replace("* x d", "d")})
     assert run(client, "potto.evaluate", uri("main"), "f(0.5)")["result"]["value"] == pytest.approx(0.5, abs=1e-12)
     assert "P0201" in run(client, "potto.evaluate", uri("main"), "nowhere")["error"]["message"]
+
+
+def test_editing_a_function_compiles_that_function_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("POTTO_CACHE", "off")
+    kernels.clear()
+    world, file = World(), "/main.po"
+    shaders = {name: f"def {name}(x, c) {body}\n" for name, body in (("dim", "c*x"), ("bright", "c*x^3"))}
+    seen = "".join(f"def in_{name}(c) integral [0, 1] {name}(x, c)*[sin(x) < c] d(x)\n" for name in shaders)
+
+    def compiled(**changed: str) -> int:
+        texts = {file: "".join({**shaders, **changed}.values()) + seen}
+        before = counts.compiled
+        for text in ("in_dim(0.7)", "in_bright(0.7)"):
+            task = {"do": "evaluate", "file": file, "text": text, "texts": texts, "roots": ()}
+            assert "result" in answered(world, task)
+        return counts.compiled - before
+
+    assert compiled() > 4
+    assert compiled() == 0
+    assert compiled(dim="def dim(x, c) exp(c*x)\n") == 2  # its values with what they round off, and without
+    assert compiled() == 0
 
 
 def test_run_a_script(server: Server, uri: Uri) -> None:
