@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import math
 import time
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 from potto.cli.calling import add_set, assignment, called
@@ -13,8 +14,8 @@ from potto.cli.numbers import accounts, add_options, add_workers, settings_of, s
 
 if TYPE_CHECKING:
     from potto.applications.images import Grid
-    from potto.checking.library import Library
     from potto.cli.rendering import Drawn, Layer
+    from potto.evaluating.world import World
     from potto.projects.settings import Settings
 
 SUMMARY = "draw a function of two numbers as an image, and its derivatives"
@@ -41,7 +42,9 @@ def configure(parser: argparse.ArgumentParser) -> None:
     moving.add_argument("--over", metavar="NAME=FROM..TO", type=_over, help="let a parameter move from frame to frame")
     moving.add_argument("--frames", metavar="N", type=_frames, help="how many (default 60)")
     moving.add_argument("--fps", metavar="N", type=_positive, help="frames a second (default 20)")
-    parser.add_argument("--watch", action="store_true", help="draw again whenever a file of the program changes")
+    parser.add_argument(
+        "--watch", action="store_true", help="draw again whenever a file of the program or of its data changes"
+    )
     add_workers(parser)
     add_set(parser)
     add_options(parser)
@@ -244,18 +247,22 @@ def grid_of(options: argparse.Namespace) -> Grid:
     return Grid(*_shape(options), options.box)
 
 
-def _watched(options: argparse.Namespace) -> Library | None:
-    """The files of the program; None as long as it is not there."""
-    from potto.checking.library import Library
+def _watched(options: argparse.Namespace) -> World | None:
+    """The files of the program and of the data that it is given; None as long as the program is not there."""
     from potto.cli.opening import opened
     from potto.diagnostics import PottoError
+    from potto.evaluating.world import World
 
-    library = Library(["."])
+    world = World(["."])
     try:
-        library.diagnostics(opened(library, options.file, after=options.name))
+        file = opened(world, options.file, after=options.name)
     except PottoError:
         return None
-    return library
+    world.diagnostics(file)
+    for _, text in (*options.set, *options.given):
+        with suppress(PottoError):  # is told when it is drawn
+            world.typed(file, text)
+    return world
 
 
 def _once(options: argparse.Namespace, target: str, settings: Settings, console: Console) -> int:

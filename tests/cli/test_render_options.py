@@ -301,8 +301,9 @@ def _until(condition: object, seconds: float = 60.0) -> bool:
 def test_watching_draws_again(tmp_path: Path) -> None:
     source, image = tmp_path / "s.po", tmp_path / "f.npy"
     (tmp_path / "other.po").write_text("k = 1\n")
-    source.write_text("from other import k\ndef f(x, y) k*x\n")
-    process = _started(tmp_path, "s.po", "f", "--size", "2x1", "-o", "f.npy", "--watch")
+    (tmp_path / "w.csv").write_text("1\n2\n")
+    source.write_text("from other import k\ndef f(x, y, w: [2] Real) k*x*w[0]\n")
+    process = _started(tmp_path, "s.po", "f", "w=@w.csv", "--size", "2x1", "-o", "f.npy", "--watch")
 
     def shows(*numbers: float) -> bool:
         try:
@@ -314,9 +315,11 @@ def test_watching_draws_again(tmp_path: Path) -> None:
         assert _until(lambda: shows(0.25, 0.75))
         (tmp_path / "other.po").write_text("k = 2\n")
         assert _until(lambda: shows(0.5, 1.5))
-        source.write_text("def f(x, y) x +\n")  # a mistake ends nothing
-        time.sleep(2.0)
-        source.write_text("def f(x, y) 4*x\n")
+        (tmp_path / "w.csv").write_text("3\n2\n")
+        assert _until(lambda: shows(1.5, 4.5))
+        source.write_text("def f(x, y, w) x +\n")  # a mistake ends nothing
+        time.sleep(1.0)
+        source.write_text("def f(x, y, w: [2] Real) 4*x\n")
         assert _until(lambda: shows(1.0, 3.0))
     finally:
         process.send_signal(signal.SIGINT)
