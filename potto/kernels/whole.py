@@ -42,10 +42,6 @@ def looked_through(most: float = math.inf) -> Iterator[None]:
         _looking.most = before
 
 
-def _members(value: Any) -> bool:
-    return isinstance(value, np.ndarray) and value.size <= _looking.most
-
-
 def _rounded(value: Any, exact: Any) -> Any:
     return np.where(exact, 0.0, UNIT_ROUNDOFF * abs(value))
 
@@ -58,7 +54,11 @@ def _all_whole(*numbers: Any) -> Any:
 
 
 def _whole(*numbers: Any) -> bool:
-    return all(isinstance(x, float) and x.is_integer() for x in numbers)
+    # Asked at every operation, and `all` of a generator takes twice as long.
+    for x in numbers:  # noqa: SIM110
+        if not isinstance(x, float) or not x.is_integer():
+            return False
+    return True
 
 
 def add(value: Any, *args: Any) -> Any:
@@ -67,7 +67,10 @@ def add(value: Any, *args: Any) -> Any:
     Of a batch the last one counts as half a unit in the last place, which takes two passes and not six: only what was
     lost on the way may be more than the value tells.
     """
-    batch = isinstance(value, np.ndarray) and not _members(value)
+    array = isinstance(value, np.ndarray)
+    batch = array and value.size > _looking.most
+    if batch and len(args) == 2:
+        return UNIT_ROUNDOFF * abs(value)
     off: Any = UNIT_ROUNDOFF * abs(value) if batch else 0.0
     total: Any = args[0]
     for number, arg in enumerate(args[1:], 2):
@@ -78,22 +81,26 @@ def add(value: Any, *args: Any) -> Any:
         off = off + abs((total - (longer - part)) + (arg - part))
         total = longer
     if batch:
-        known = len(args) == 2 or np.add.reduce(off, None) < math.inf
+        known = np.add.reduce(off, None) < math.inf
         return off if known else np.where(np.isfinite(off), off, UNIT_ROUNDOFF * abs(value))
-    if isinstance(value, np.ndarray):
+    if array:
         return np.where(off < math.inf, off, UNIT_ROUNDOFF * abs(value))
     return off if off < math.inf else UNIT_ROUNDOFF * abs(value)  # an infinite sum rounds off nan
 
 
 def mul(value: Any, *args: Any) -> Any:
-    if _members(value):
+    if isinstance(value, np.ndarray):
+        if value.size > _looking.most:
+            return UNIT_ROUNDOFF * abs(value)
         return _rounded(value, _all_whole(*args) & (abs(value) <= LARGEST))
     exact = _whole(*args) and abs(value) <= LARGEST
     return 0.0 if exact else UNIT_ROUNDOFF * abs(value)
 
 
 def div(value: Any, above: Any, below: Any) -> Any:
-    if _members(value):
+    if isinstance(value, np.ndarray):
+        if value.size > _looking.most:
+            return UNIT_ROUNDOFF * abs(value)
         kept = _all_whole(value, above, below) & (abs(above) <= LARGEST)
         return _rounded(value, kept & (value * below == above))
     exact = _whole(value, above, below) and abs(above) <= LARGEST and value * below == above
@@ -101,7 +108,9 @@ def div(value: Any, above: Any, below: Any) -> Any:
 
 
 def power(value: Any, base: Any, exponent: Any) -> Any:
-    if _members(value):
+    if isinstance(value, np.ndarray):
+        if value.size > _looking.most:
+            return UNIT_ROUNDOFF * abs(value)
         whole = _all_whole(value, base, exponent) & (abs(value) <= LARGEST) & (exponent >= 0)
         return _rounded(value, whole & (np.broadcast_to(exponent, np.shape(value)) <= HIGHEST))
     exact = _whole(value, base, exponent) and abs(value) <= LARGEST and 0 <= exponent <= HIGHEST
