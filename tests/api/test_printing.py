@@ -283,15 +283,17 @@ def test_ten_thousand_printed_intervals_contain_their_values() -> None:
     values[::50] = 0.0
     errors = np.where(values == 0, 1.0, np.abs(values)) * 10 ** random.uniform(-17, 1.5, 10_000)
     for value, error in zip(values.tolist(), errors.tolist(), strict=True):
-        low, high = Fraction(value) - Fraction(error), Fraction(value) + Fraction(error)
+        exact, off = Fraction(value), Fraction(error)
+        low, high = exact - off, exact + off
         estimate = potto.Estimate(value, error)
         for text in (interval(estimate), str(estimate), repr(estimate).split("  ")[0], f"{estimate}"):
             middle, bar = (Fraction(part) for part in read(text))
             slack = max(abs(low), abs(high)) / 10**15 if text == interval(estimate) else 0
-            assert middle - bar <= Fraction(value) <= middle + bar, (value, error, text)
-            assert middle - bar - slack - bar / 10**10 <= low and high <= middle + bar + slack + bar / 10**10, text
+            assert middle - bar <= exact <= middle + bar, (value, error, text)
+            wider = bar + slack + bar / 10**10
+            assert middle - wider <= low and high <= middle + wider, text
         alone = Fraction(format_number(value, error))
-        assert abs(alone - Fraction(value)) <= 10 * Fraction(error) + abs(Fraction(value)) / 10**15, (value, error)
+        assert abs(alone - exact) <= 10 * off + abs(exact) / 10**15, (value, error)
 
 
 @pytest.mark.parametrize(
