@@ -42,7 +42,6 @@ OUTSIDERS: dict[str, tuple[str, ...]] = {
         "potto.python.accepting",
         "potto.python.arguments",
         "potto.python.arrays",
-        "potto.python.at_once",
         "potto.python.forms",
         "potto.python.gradients",
         "potto.applications",
