@@ -31,7 +31,7 @@ def accepted(argument: Any, type: Type | None) -> Any:
     found = None if type is None else resolve(type)
     record = record_in(found)
     if record is not None and hasattr(argument, "columns") and hasattr(argument, "to_numpy"):  # a table of pandas
-        return {str(name): argument[name].to_numpy() for name in argument.columns}
+        return {str(name): argument[name] for name in argument.columns}
     if not isinstance(argument, PLAIN):
         argument = _standard(argument)
     if isinstance(found, Real | Dist) and isinstance(argument, list):

@@ -73,7 +73,7 @@ def _array(name: str, argument: Any, type: ArrayOf, sizes: Sizes) -> Any:
     if isinstance(argument, Estimate) and argument.tangent is None:
         return _answer(name, argument, type, sizes)
     if hasattr(argument, "to_numpy"):
-        argument = argument.to_numpy()
+        argument = _of_table(name, argument)
     item = resolve(type.item)
     if isinstance(argument, Mapping) and isinstance(item, TupleOf) and item.record is not None:
         return _columns(name, argument, type.size, item, item.record, sizes)
@@ -89,6 +89,33 @@ def _array(name: str, argument: Any, type: ArrayOf, sizes: Sizes) -> Any:
         items = [with_arrays(name, item, type.item, sizes) for item in argument]
         return listed(items) if items and all(isinstance(item, Rows) for item in items) else items
     return argument
+
+
+def _of_table(name: str, table: Any) -> Any:
+    """The numbers of a table or of a column of pandas. A gap would be nan in whatever comes of it: where it is is told."""
+    numbers = table.to_numpy()
+    gaps = [place for place, value in np.ndenumerate(numbers) if _is_gap(value)] if _may_have_gaps(numbers) else []
+    if not gaps:
+        return numbers
+    row, *column = gaps[0]
+    labels, names = getattr(table, "index", None), getattr(table, "columns", ())
+    where = f"row {labels[row] if hasattr(labels, '__getitem__') else row}"
+    if column:
+        where += f" of column `{names[column[0]]}`"
+    more = f", and {len(gaps) - 1} more are missing" if len(gaps) > 1 else ""
+    help = "leave such rows out, `table.dropna()`, or fill them in, `table.fillna(…)`"
+    raise wrong_call(f"`{name}` has no value in {where}{more}", help)
+
+
+def _may_have_gaps(numbers: Any) -> bool:
+    return numbers.dtype.kind == "O" or (numbers.dtype.kind == "f" and bool(np.isnan(numbers).any()))
+
+
+def _is_gap(value: Any) -> bool:
+    try:
+        return value is None or bool(value != value)
+    except TypeError:  # of pandas' NA, which is neither
+        return True
 
 
 def _columns(

@@ -22,6 +22,7 @@ from potto.types import (  # noqa: F401  (imported for their rules)
     flow_binders,
     flow_calls,
     flow_rules,
+    indices,
     integrals,
 )
 from potto.types.algebra import fitted, flat, symbolic

@@ -90,7 +90,8 @@ def _truth(inference: Inference, expr: nodes.Expr, where: str) -> None:
 @rule(nodes.If)
 def _if(inference: Inference, node: nodes.If) -> Type:
     _condition(inference, node)
-    then, orelse = inference.infer(node.then), inference.infer(node.orelse)
+    with inference.at_times():
+        then, orelse = inference.infer(node.then), inference.infer(node.orelse)
     if not unify(then, orelse):
         inference.report(mismatch(
             orelse, then, node.orelse, "both branches must be of one type: the second one",

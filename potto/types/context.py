@@ -8,8 +8,9 @@ names in scope, what is to be looked at once everything else is known, and the d
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
-from typing import Any, Literal, TypeVar
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any, Literal, NamedTuple, TypeVar
 
 from potto.diagnostics import Diagnostic
 from potto.modules.lookup import DefinitionTarget
@@ -84,6 +85,23 @@ class Part:
     type: Type
 
 
+class End(NamedTuple):
+    """A size as another one that is not known, if there is such a one in it, and a number."""
+
+    base: Type | None
+    offset: int
+
+
+@value
+class Reach:
+    """The least and the greatest that the index `name` of a range is."""
+
+    name: str
+    over: nodes.Range
+    low: End
+    high: End
+
+
 @value
 class _Pending:
     """A type that is not known yet, and what is to be its dual; `node` is what is derived.
@@ -128,6 +146,7 @@ class Inference:
         self.sizes: dict[str, Type] = {}  # the names of sizes in annotations
         self.mixed: set[int] = set()  # the `and`, `or`, `not` of conditions, where brackets may stand
         self.integrals = 0  # how many integrals are around the place that is looked at
+        self.reaches: dict[int, Reach] = {}  # by locals: what the indices of loops reach where it is looked at
         self._late: list[Callable[[], None]] = []
         self._duals: list[_Pending] = []
         self._generation = 0  # of the dual that is being derived
@@ -199,6 +218,20 @@ class Inference:
     def recursive(self) -> bool:
         """Whether the definition refers to one of its own group."""
         return any(isinstance(meaning, Member) for meaning in self.meanings.values())
+
+    @contextmanager
+    def loop(self) -> Iterator[None]:
+        """What indices reach in a loop is forgotten behind it."""
+        around = self.reaches
+        yield
+        self.reaches = around
+
+    @contextmanager
+    def at_times(self) -> Iterator[None]:
+        """In what may not be evaluated each time that a loop turns."""
+        with self.loop():
+            self.reaches = {}
+            yield
 
     # Fitting
 

@@ -222,7 +222,7 @@ def escape(expr: nodes.Expr, message: str) -> Diagnostic:
 
 @rule(nodes.Lambda)
 def _lambda(inference: Inference, node: nodes.Lambda) -> Type:
-    with inference.scope.inside():
+    with inference.scope.inside(), inference.at_times():
         groups = [inference.bind_group(group, lambda a: written_type(inference, a)) for group in node.groups]
         result = returned(inference, inference.infer(node.body), node.body)
     for group in reversed(groups):
@@ -271,7 +271,8 @@ def bindings(inference: Inference, block: Sequence[nodes.Binding]) -> None:
     """Bring the names of a block into scope, one after the other."""
     for binding in block:
         inference.level += 1
-        type = inference.infer(binding.value)
+        with inference.at_times():  # where the name is used
+            type = inference.infer(binding.value)
         inference.level -= 1
         if len(binding.targets) == 1:
             _bind_one(inference, binding, type)
