@@ -68,6 +68,13 @@ def test_a_name_of_elsewhere() -> None:
     assert fixed("def f(x) $0ln(x)\n", "Change to `log`") == "def f(x) log(x)\n"
 
 
+def test_a_range_that_leads_out_of_an_array() -> None:
+    ends = "def f(xs: [n] Real) sum i in {}..{} ({})\n"
+    assert fixed(ends.format(0, "n", "xs[$0i]"), "Write `n - 1`") == ends.format(0, "n - 1", "xs[i]")
+    assert fixed(ends.format(0, "n-1", "xs[$0i - 1]"), "Write `1`") == ends.format(1, "n-1", "xs[i - 1]")
+    assert fixed(ends.format(0, "n-1", "xs[$0n - i]"), "Write `1`") == ends.format(1, "n-1", "xs[n - i]")
+
+
 def test_no_last_element_where_there_is_none() -> None:
     assert not [title for title in fixture("k = [][$00]\n").actions() if title.startswith("Write")]
 

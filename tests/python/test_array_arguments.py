@@ -109,6 +109,39 @@ def test_columns_lists_and_answers_are_arrays() -> None:
     assert potto.grad(MODULE.mean)(Column([1.0, 2.0])).tangent.tolist() == [0.5, 0.5]
 
 
+class Table:
+    """What pandas gives for a table, as far as it is asked."""
+
+    index, columns = ("ann", "bob", "cy"), ("x", "y")
+
+    def __init__(self, **columns: list[Any]) -> None:
+        self.held = columns
+
+    def __getitem__(self, name: str) -> Any:
+        column: Any = Column(self.held[name])
+        column.index = self.index
+        return column
+
+    def to_numpy(self) -> Any:
+        return np.array(list(self.held.values())).T
+
+
+def test_a_gap_in_a_table_is_told_with_row_and_column() -> None:
+    m = potto.compile(
+        "record Row(x: Real, y: Real)\n"
+        "def area(rows: [n] Row) sum r in rows (r.x*r.y)\n"
+        "def trace(xs: [n, m] Real) xs[0, 0] + xs[1, 1]\n"
+    )
+    table = Table(x=[1.0, 2.0, 3.0], y=[1.0, None, None])
+    with pytest.raises(potto.PottoError, match=r"`rows.y` has no value in row bob, and 1 more are missing"):
+        m.area(table)
+    with pytest.raises(potto.PottoError, match=r"`xs` has no value in row cy of column `x`"):
+        m.trace(Table(x=[1.0, 2.0, np.nan], y=[1.0, 2.0, 3.0]))
+    with pytest.raises(potto.PottoError, match=r"`xs` has no value in row 1 \["):
+        MODULE.mean(Column([1.0, np.nan]))
+    assert m.area(Table(x=[1.0, 2.0], y=[3.0, 4.0])).value == 11.0
+
+
 def test_an_answer_keeps_its_error_as_an_array() -> None:
     rough = potto.compile("def f(t) [integral [0, 1] (exp(sin(k*x*t))) d(x) for k in 1..3]").f(2.0)
     assert rough.value.shape == rough.error.shape == (3,)

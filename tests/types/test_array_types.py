@@ -107,6 +107,33 @@ def test_indices() -> None:
     """)
 
 
+def test_an_index_that_follows_a_range_out_of_its_array() -> None:
+    check("""
+        k = [1, 2, 3]
+        a = sum i in 0..3 (k[i])
+        #                    ^ error[P0328]: the index `i` is out of range: it reaches 3, and the array has 3 elements
+        b = fold s = 0 for i in 1..len(k) (s + k[i - 2])
+        #                                        ^^^^^ error[P0328]: the index `i - 2` is out of range: it reaches -1
+        def c(xs: [n] Real) [xs[i + 1] - xs[i] for i in 0..n-1]
+        #                       ^^^^^ error[P0328]: the index `i + 1` is out of range: it reaches the number of
+        def d(xs: [n, m] Real) max i in 0..n-1, j in 0..i (xs[i - j, m - 1 - i] + xs[n - j, 0])
+        #                                                                            ^^^^^ error[P0328]: the index `n - j`
+        def e(xs) integral [0, 1] sum i in 0..len(xs) (xs[i]*[x < i]) d(x)
+        #                                                 ^ error[P0328]: the index `i` is out of range
+    """)
+
+
+def test_indices_that_stay_in_range_where_they_are_reached() -> None:
+    check("""
+        def a(xs: [n] Real) sum i in 0..n-1 (if i < n - 1 then xs[i + 1] else 0)
+        def b(xs: [n] Real) sum i in 0..n-1 (let x = xs[i + 1] in if i < n - 1 then x else 0)
+        def c(xs: [n] Real) sum i in 0..n-1, j in i+1..n-1 (xs[i + 1]*xs[j])
+        def d(xs: [n] Real) sum i in 0..n-1 (sum j in 0..i-1 (xs[i - 1]*xs[j + 1]*xs[i - j] + xs[n - 1 - i]))
+        def e(xs: [n] Real) sum i in 1..n (xs[i - 1] + xs[n - i]) + sum i in 3..2 (xs[i - 9])
+        def f(xs: [n] Real, ys: [n + 1] Real) sum i in 0..n (ys[i]) + sum k in 0..4 (xs[k])
+    """)
+
+
 def test_an_index_that_is_a_size() -> None:
     check("""
         def a(xs: [n] Real) xs[n]
