@@ -92,7 +92,7 @@ def _array(name: str, argument: Any, type: ArrayOf, sizes: Sizes) -> Any:
 
 
 def _of_table(name: str, table: Any) -> Any:
-    """The numbers of a table or of a column of pandas. A gap would be nan in whatever comes of it: where it is is told."""
+    """The numbers of a table or a column of pandas; of a gap, which would be nan in all that follows, where it is."""
     numbers = table.to_numpy()
     gaps = [place for place, value in np.ndenumerate(numbers) if _is_gap(value)] if _may_have_gaps(numbers) else []
     if not gaps:

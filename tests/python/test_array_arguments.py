@@ -281,7 +281,7 @@ def share(c: Camera, depth) c.focal/(depth - c.eye.z)
         assert isinstance(slopes, dict) == isinstance(camera, dict)  # in the form of what was given
         by_eye, by_focal = (slopes["eye"], slopes["focal"]) if isinstance(slopes, dict) else slopes
         assert (*by_eye, by_focal) == pytest.approx((0, 0, 1.5 / 36, 1 / 6), rel=1e-15)
-    with pytest.raises(potto.PottoError, match="`c` is Camera, and what is given has no `focal`"):
+    with pytest.raises(potto.PottoError, match="`c` is Camera, but what is given has no `focal`"):
         module.share({"eye": eye}, 1.0)
     with pytest.raises(potto.PottoError, match="has `zoom`, which it does not know"):
         module.share({"eye": eye, "focal": 1.0, "zoom": 2.0}, 1.0)
