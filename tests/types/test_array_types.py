@@ -117,7 +117,7 @@ def test_an_index_that_follows_a_range_out_of_its_array() -> None:
         def c(xs: [n] Real) [xs[i + 1] - xs[i] for i in 0..n-1]
         #                       ^^^^^ error[P0328]: the index `i + 1` is out of range: it reaches the number of
         def d(xs: [n, m] Real) max i in 0..n-1, j in 0..i (xs[i - j, m - 1 - i] + xs[n - j, 0])
-        #                                                                            ^^^^^ error[P0328]: the index `n - j
+        #                                                                            ^^^^^ error[P0328]: the index `n -
         def e(xs) integral [0, 1] sum i in 0..len(xs) (xs[i]*[x < i]) d(x)
         #                                                 ^ error[P0328]: the index `i` is out of range
     """)
