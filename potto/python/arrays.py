@@ -98,7 +98,8 @@ def _of_table(name: str, table: Any) -> Any:
     if not gaps:
         return numbers
     row, *column = gaps[0]
-    labels, names = getattr(table, "index", None), getattr(table, "columns", ())
+    labels: Any = getattr(table, "index", None)
+    names = getattr(table, "columns", ())
     where = f"row {labels[row] if hasattr(labels, '__getitem__') else row}"
     if column:
         where += f" of column `{names[column[0]]}`"
