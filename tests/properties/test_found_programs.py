@@ -255,3 +255,15 @@ def test_a_surface_folds_under_a_variable_that_is_eliminated() -> None:
     assert abs(answer.value - 1.4 * math.sinh(1)) <= answer.error <= 1e-3
     sides = above, above - 0.3 / math.e
     assert min(abs(answer.tangent - side) for side in sides) <= answer.tangent_error <= 1e-3
+
+
+def test_sides_that_few_evaluations_leave_unknown_do_not_replace_what_is_known() -> None:
+    """Two surfaces are one at t = 0 and move apart: at speeds 1/3 and 1, so that 2/3 - 1 of the weight of x is swept.
+    Its second digit was wrong, with a bar of 3e-12."""
+    f = potto.compile("""def f(t) integral ([-2, inf], [-1, 1], [0, 1])
+        (2*[z^3 + y^3 >= t*z*y] - [z + y <= t])*exp(-x^2) d(x, y, z)""").f
+    with potto.settings(max_evals=100_000):
+        answer = potto.deriv(f)((0.0, 1.0))
+    weight = math.sqrt(math.pi) / 2 * (1 + math.erf(2))
+    assert abs(answer.value - 2.5 * weight) <= answer.error
+    assert abs(answer.tangent + weight / 3) <= answer.tangent_error <= 1e-9

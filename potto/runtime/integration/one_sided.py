@@ -61,9 +61,11 @@ def on_both_sides(problem: Problem, order: Integral, sums: Sums) -> Sums:
         if there.size:
             sided = (x[..., there] for x in (backward, forward, before, beyond))
             machine.note(OneSidedDerivatives(cause, *sided), there)
-    t, et = np.where(same, forward, sums.t), sums.et
+    t, et, off = sums.t, sums.et, np.maximum(before, beyond)
+    # With few evaluations left the sides may be known less well than what they agree with.
+    one = same & ((off < et) | ~(np.abs(t - forward) <= et + off))
+    t, et = np.where(one, forward, t), np.where(one, off, et)
     nearer = np.where(np.abs(t - forward) <= np.abs(t - backward), forward, backward)
-    off = np.maximum(before, beyond)
     better = np.isfinite(backward) & np.isfinite(forward) & (off < et) & (np.abs(t - nearer) <= et)
     t, et = np.where(better, nearer, t), np.where(better, off, et)
     return replace(sums, t=t, et=et)
