@@ -332,4 +332,4 @@ class Inference:
             check()
 
 
-quick(Plan, Part, _Pending)
+quick(Plan, Part, Reach, _Pending)

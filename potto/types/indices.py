@@ -10,7 +10,7 @@ import math
 
 from potto.diagnostics import Related, Suggestion, shortened, suggest
 from potto.modules.texts import definition
-from potto.quick import value
+from potto.quick import quick, value
 from potto.source import Span
 from potto.syntax import nodes
 from potto.syntax.printer import print_expression
@@ -316,3 +316,6 @@ def _sum(a: End, b: End, down: bool) -> End | None:
     if down:
         return End(None, a.offset - b.offset) if a.base is b.base else None
     return End(b.base, a.offset + b.offset) if a.base is None else None
+
+
+quick(_Reached)

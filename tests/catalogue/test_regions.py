@@ -20,7 +20,7 @@ from regions import ENTRIES, REGIONS, Region
 import potto
 
 EPS = 2.0**-52
-PATIENCE = 20.0  # seconds of processor time that a region may take
+PATIENCE = 40.0  # seconds of processor time that a region may take, on a machine half as fast as others
 SECOND_WITHIN = 1e-6  # what is asked of second derivatives
 
 UNMET: dict[str, str] = {}

@@ -47,7 +47,7 @@ def arithmetic(pick: random.Random, depth: int) -> Term:
     if at < 0.84:
         return core.prim("clamp", a, b, arithmetic(pick, depth - 1))
     if at < 0.92:
-        compared = core.prim(pick.choice(("lt", "le", "gt", "ge", "eq", "ne")), a, b)
+        compared = core.prim(pick.choice(("lt", "le", "eq", "ne")), a, b)
         return core.if_(core.prim("not", compared) if at < 0.88 else compared, b, arithmetic(pick, depth - 1))
     return core.branch((a,), pick.random() < 0.5, b, arithmetic(pick, depth - 1))
 

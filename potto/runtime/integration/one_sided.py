@@ -113,9 +113,10 @@ def beside_folds(problem: Problem, plan: Plan, sums: Sums) -> None:
         if machine.side:
             t[:], et[:] = _of_side(machine.side, backward, forward, off)
             continue
-        if _same(backward, forward, off[0] + off[1]) and np.isfinite(forward).all():
-            known = np.isfinite(t) & (np.abs(t - forward) <= SAME * np.abs(forward) + et)
-            t[:], et[:] = np.where(known, t, forward), np.where(known, et, off[0] + off[1])
+        both = off[0] + off[1]
+        if _same(backward, forward, both) and np.isfinite(forward).all():
+            known = np.isfinite(t) & (np.abs(t - forward) <= SAME * np.abs(forward) + et + both)
+            t[:], et[:] = np.where(known, t, forward), np.where(known, et, both)
             continue
         known = np.isfinite(t) & np.isfinite(et)
         t[:] = np.where(known, t, np.where(np.isfinite(backward), backward, forward))
