@@ -27,7 +27,7 @@ def test_the_sessions_on_the_page(talk):
 
 
 def _loosely(text):
-    """Without what is measured: times, whole lines in the table of times, what was in memory already, and what only a slow
+    """Without what is measured: times, whole lines in the table of times, what was in memory, and what only a slow
     machine says."""
     measured = r"(?:exact,|(?:parse|check|compile|link|evaluate|total|\d+ kernels?)\b)"
     lines = [line for line in settled(text).splitlines() if not re.match(measured, line)]
