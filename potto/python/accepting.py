@@ -32,6 +32,8 @@ def accepted(argument: Any, type: Type | None) -> Any:
     record = record_in(found)
     if record is not None and hasattr(argument, "columns") and hasattr(argument, "to_numpy"):  # a table of pandas
         return {str(name): argument[name] for name in argument.columns}
+    if isinstance(found, ArrayOf) and hasattr(argument, "to_numpy"):
+        return argument  # with its labels, by which a gap is told
     if not isinstance(argument, PLAIN):
         argument = _standard(argument)
     if isinstance(found, Real | Dist) and isinstance(argument, list):

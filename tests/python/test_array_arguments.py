@@ -100,6 +100,9 @@ class Column:
     def to_numpy(self) -> Any:
         return np.array(self.numbers)
 
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> Any:
+        return self.to_numpy()
+
 
 def test_columns_lists_and_answers_are_arrays() -> None:
     assert MODULE.mean(Column([1.0, 2.0, 6.0])).value == 3.0
