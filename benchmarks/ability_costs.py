@@ -140,8 +140,10 @@ def many_values() -> Finding:
 def array_of_one() -> Finding:
     d, shader = equation()
     one = np.array([-0.7])
-    answer, seconds = once(lambda: d((one, 1.0), shader))
-    number = once(lambda: d((-0.7, 1.0), shader))[1]
+    seconds = number = math.inf
+    for _ in range(5):  # machine code is made meanwhile
+        answer, took = once(lambda: d((one, 1.0), shader))
+        seconds, number = min(seconds, took), min(number, once(lambda: d((-0.7, 1.0), shader))[1])
     off = relative(float(answer.tangent[0]), exact_quad(-0.7)[1])
     ratio = seconds / number
     return Finding(float(answer.value[0]), float(answer.error[0]), off, answer.evals, seconds, ratio, ratio <= SAME)
