@@ -11,12 +11,13 @@ from __future__ import annotations
 import operator
 from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache, reduce
+from itertools import chain
 
 from msgspec import Struct
 
 from potto.calculus.differentiation.derivative import partial
 from potto.core.terms import Branch, Const, If, Prim, Term, Var, postorder, var
-from potto.kernels.whole import ROUNDING, UNIT_ROUNDOFF
+from potto.kernels.whole import ROUNDING, TWICE, UNIT_ROUNDOFF
 from potto.primitives import PRIMITIVES
 from potto.primitives.walking import formula_of
 
@@ -78,6 +79,19 @@ def second_partial(op: str, arity: int, i: int, j: int) -> Term:
 @lru_cache(maxsize=4096)
 def _parts(term: Term) -> tuple[Term, ...]:
     return tuple(postorder(term))
+
+
+def exact_slopes(op: str, args: Sequence[Scalar], d: int) -> list[tuple[str, str]] | None:
+    """The slopes that the tangent in a direction is made with, and the tangents that they multiply, where slopes are
+    arguments as they are, or twice that; None where a builtin's slopes are rounded themselves."""
+    if op == "add":
+        return [(ONE, x) for a in args if (x := a.t[d])]
+    if op == "mul":
+        a, b = args
+        return [(y.v, t) for x, y in ((a, b), (b, a)) if (t := x.t[d])]
+    if op == "pow" and args[1].v == "2.0":
+        return [(args[0].v, t) for t in args[0].t[d : d + 1] if t]
+    return None
 
 
 class Lines:
@@ -230,7 +244,7 @@ class Lines:
         e = self.total([f"abs({self.product(slope[i], x)})" for i in moving if (x := args[i].e)])
         if self.side and self.directions and PRIMITIVES[op].kinks(*map(var, names)):
             return self.rounded(Scalar(v, e, *self.on_one_side(op, args, bend)), op, args)
-        return self.rounded(Scalar(v, e, *self.tangents(args, slope, bend)), op, args)
+        return self.rounded(Scalar(v, e, *self.tangents(op, args, slope, bend)), op, args)
 
     def on_one_side(self, op: str, args: Sequence[Scalar], bend: Bend) -> Tangents:
         """The tangents of a builtin with kinks: where it is at one its slopes are not the same in every direction."""
@@ -243,11 +257,11 @@ class Lines:
             self.side, side = 0, self.side
             slopes = {i: self.smooth(first[i], local, memo, (d, side)).v for i, a in enumerate(args) if not a.plain}
             self.side = side
-            t, et = self.tangents(args, slopes, bend)
+            t, et = self.tangents(op, args, slopes, bend)
             found.append((t[d], et[d]))
         return tuple(t for t, _ in found), tuple(et for _, et in found)
 
-    def tangents(self, args: Sequence[Scalar], slopes: Mapping[int, str], bend: Bend) -> Tangents:
+    def tangents(self, op: str, args: Sequence[Scalar], slopes: Mapping[int, str], bend: Bend) -> Tangents:
         """The tangents of a builtin with these slopes by those of its arguments that move or are not exact."""
         t, et = [], []
         for d in range(self.directions):
@@ -275,11 +289,20 @@ class Lines:
             if entry.off:
                 unit += f" + {entry.off!r}"
             e = self.let(f"{e + ' + ' if e else ''}{unit}", "e")
-        et = tuple(
-            self.let(f"{old + ' + ' if old else ''}{2 * UNIT_ROUNDOFF!r}*abs({t})", "e") if t else old
-            for t, old in zip(x.t, x.et, strict=True)
-        )
-        return Scalar(x.v, e, x.t, et)
+        et: list[str | None] = []
+        for d, (t, old) in enumerate(zip(x.t, x.et, strict=True)):
+            lost = self.tangent_rounded(t, op, args, d) if t else None
+            et.append(self.let(f"{old} + {lost}" if old else lost, "e") if lost else old)
+        return Scalar(x.v, e, x.t, tuple(et))
+
+    def tangent_rounded(self, t: str, op: str, args: Sequence[Scalar], d: int) -> str | None:
+        """What a tangent rounds off; None where it is another one as it was."""
+        factors = exact_slopes(op, args, d)
+        if factors is None:
+            return f"{TWICE!r}*abs({t})"
+        if op != "pow" and len(factors) == 1 and ONE in factors[0]:
+            return None
+        return f"{self.ufunc('whole.slopes')}({', '.join((t, *chain.from_iterable(factors)))})"
 
     def smooth(
         self, term: Term, local: dict[str, Scalar], memo: dict[Term, Scalar],

@@ -18,7 +18,7 @@ import numpy as np
 from potto.core.terms import Branch, Const, If, Term
 from potto.kernels import tape
 from potto.kernels.cells import Mask, Number, Value, combined
-from potto.kernels.whole import ROUNDING
+from potto.kernels.whole import FUNCTIONS
 from potto.primitives import PRIMITIVES, Primitive
 from potto.primitives.registry import Elementwise
 from potto.primitives.walking import Domain
@@ -33,7 +33,7 @@ def function(path: str) -> Callable[..., Any]:
     if where == "potto":
         return getattr(importlib.import_module("potto.kernels.ufuncs"), name)  # type: ignore[no-any-return]
     if where == "whole":
-        return ROUNDING[name]
+        return FUNCTIONS[name]
     if where == "builtin":
         return ARRAYS.function(name)
     if where == "tape":

@@ -6,7 +6,8 @@ the cost of a few values whatever their number (reverse accumulation); pushed fo
 
 An edge keeps with its slope how far off that may be. To first order an error is then a sum over edges: the sensitivity
 of the answer, along all paths without regard to sign, times what the slope is off, times how far the seeds can have
-moved the parent, again without regard to sign. Two more numbers for each node are swept along for it.
+moved the parent, again without regard to sign. Two more numbers for each node are swept along for it. Where slopes are
+exact and all is whole, nothing is rounded off, as in `whole`.
 
 Nodes stand for arrays where numbers are batches: they have a shape, can be indexed, and numpy's functions that only
 move members about (`MOVES`) take them. Anything else done to one raises `Untaped`, and forward mode is used.
@@ -20,16 +21,15 @@ from types import EllipsisType
 from typing import Any
 
 import numpy as np
+from msgspec import Struct
 
-from potto.kernels.whole import UNIT_ROUNDOFF
+from potto.kernels.whole import LARGEST, SHORT, TWICE
 
 Pull = Callable[[Any], Any]
 Shape = tuple[int, ...]
 Swept = tuple[Any, Any]  # a derivative and how far off it may be
 
 FEW = 64  # leaves, up to which a node knows which of them it is made of
-
-TWICE = 2 * UNIT_ROUNDOFF
 
 _numbers = itertools.count()
 
@@ -39,13 +39,15 @@ class Untaped(Exception):
 
 
 class Edge:
-    """From a node to one that it was made of: `slope` times it, the slope off by `off`; or its members moved about, by
-    what `pull` is the adjoint of."""
+    """From a node to one that it was made of: `slope` times it, the slope off by `off`, and rounded itself unless it is
+    `kept`; or its members moved about, by what `pull` is the adjoint of."""
 
-    __slots__ = ("off", "parent", "pull", "slope")
+    __slots__ = ("kept", "off", "parent", "pull", "slope")
 
-    def __init__(self, parent: Node, slope: Any = 1.0, off: Any = None, pull: Pull | None = None) -> None:
-        self.parent, self.slope, self.off, self.pull = parent, slope, off, pull
+    def __init__(
+        self, parent: Node, slope: Any = 1.0, off: Any = None, pull: Pull | None = None, kept: bool = False
+    ) -> None:
+        self.parent, self.slope, self.off, self.pull, self.kept = parent, slope, off, pull, kept
 
 
 class Node:
@@ -113,18 +115,23 @@ class Node:
         return move(*args, **given)
 
 
-def linear(*edges: tuple[Any, Any, Any]) -> Any:
-    """The sum of (slope, tangent, what the slope is off); what is no node is 0."""
-    kept: list[Edge] = []
+def linear(*edges: tuple[Any, Any, Any], kept: bool = False) -> Any:
+    """The sum of (slope, tangent, what the slope is off); what is no node is 0. kept: no slope is rounded itself."""
+    made: list[Edge] = []
     shape: Shape = ()
     for slope, parent, off in edges:
         if parent.__class__ is Node:
-            kept.append(Edge(parent, slope, off))
+            made.append(Edge(parent, slope, off, kept=kept))
             if parent.shape or not isinstance(slope, float):
                 shape = np.broadcast_shapes(shape, np.shape(slope), parent.shape)
         elif parent is not None and np.any(np.asarray(parent) != 0):
             raise Untaped
-    return Node(kept, shape) if kept else 0.0
+    return Node(made, shape) if made else 0.0
+
+
+def multiples(*edges: tuple[Any, Any, Any]) -> Any:
+    """The sum of numbers as they are times tangents, as `linear`."""
+    return linear(*edges, kept=True)
 
 
 def scattered(masks: Sequence[Any], rows: Sequence[Any], shape: Shape) -> Any:
@@ -240,62 +247,90 @@ def _in_order(nodes: Iterable[Node], by_members: bool = False) -> list[Node]:
     return sorted(seen, key=lambda node: node.number)
 
 
+class Sum(Struct, frozen=True):
+    """What has come together so far: its value, the same along all paths without regard to sign, how far off it may
+    be, and whether it is made of whole numbers, so that nothing was rounded off yet."""
+
+    value: Any
+    size: Any
+    error: Any
+    whole: bool
+
+    def __add__(self, other: Sum) -> Sum:
+        value, size, error = self.value + other.value, self.size + other.size, self.error + other.error
+        if self.whole is not other.whole:  # the others have counted what this sum rounds off
+            error = error + TWICE * (self.size if self.whole else other.size)
+        return Sum(value, size, error, self.whole and other.whole)
+
+
 def swept(answers: Sequence[tuple[Node, Any]]) -> dict[Node, Swept]:
     """The derivatives of a sum of answers, each times a weight, by every seed, and how far off they may be."""
-    sums: dict[Node, tuple[Any, Any, Any]] = {}
+    sums: dict[Node, Sum] = {}
     for node, weight in answers:
-        _gather(sums, node, weight, abs(weight), 0.0)
+        _gather(sums, node, Sum(weight, abs(weight), 0.0, _is_whole(weight)))
     found: dict[Node, Swept] = {}
-    for node in reversed(_in_order([node for node, _ in answers])):
-        adjoint, paths, error = sums.pop(node)
+    order = _in_order([node for node, _ in answers])
+    most = _largest(order, len(answers))
+    for node in reversed(order):
+        own = sums.pop(node)
         if not node.edges:
-            found[node] = adjoint, error
+            found[node] = own.value, own.error
         for edge in node.edges:
             pull = edge.pull
-            if pull is not None:
-                _gather(sums, edge.parent, pull(adjoint), pull(paths), pull(error))
-            elif edge.slope.__class__ is float and edge.slope == 1.0 and edge.off is None:
-                _gather(sums, edge.parent, adjoint, paths, error + TWICE * paths)
+            if pull is None:
+                _gather(sums, edge.parent, _along(edge, own, most))
             else:
-                steep, off = _bounds(edge)
-                more = _times(steep, error) + _times(off, paths)
-                _gather(sums, edge.parent, _times(edge.slope, adjoint), _times(steep, paths), more)
+                _gather(sums, edge.parent, Sum(pull(own.value), pull(own.size), pull(own.error), own.whole))
     return found
-
-
-def _bounds(edge: Edge) -> tuple[Any, Any]:
-    """How steep an edge is without regard to sign, and how far off its slope may be, rounding included."""
-    steep = abs(edge.slope)
-    off = TWICE * steep
-    return steep, off if edge.off is None else off + edge.off
 
 
 def pushed(nodes: Sequence[Node], directions: Sequence[Node]) -> list[list[Swept]]:
     """For each node its tangents in the direction of each leaf, and how far off they may be; None where it has none."""
-    known: dict[Node, list[Any]] = {}
-    for node in _in_order(nodes, by_members=True):
-        known[node] = [None if node is not leaf else (1.0, 1.0, 0.0) for leaf in directions]
+    known: dict[Node, list[Sum | None]] = {}
+    order = _in_order(nodes, by_members=True)
+    most = _largest(order)
+    for node in order:
+        known[node] = [None if node is not leaf else Sum(1.0, 1.0, 0.0, True) for leaf in directions]
         for edge in () if node.leaf else node.edges:
-            for d, parts in enumerate(known[edge.parent]):
-                if parts is not None:
-                    own, more = known[node][d], _pushed(edge, *parts)
-                    known[node][d] = more if own is None else tuple(a + b for a, b in zip(own, more, strict=True))
-    return [[(None, None) if x is None else (x[0], x[2]) for x in known[node]] for node in nodes]
+            for d, tangent in enumerate(known[edge.parent]):
+                if tangent is not None:
+                    own, more = known[node][d], _along(edge, tangent, most)
+                    known[node][d] = more if own is None else own + more
+    return [[(None, None) if x is None else (x.value, x.error) for x in known[node]] for node in nodes]
 
 
-def _pushed(edge: Edge, tangent: Any, size: Any, error: Any) -> tuple[Any, Any, Any]:
-    steep, off = _bounds(edge)
-    return edge.slope * tangent, steep * size, steep * error + off * size
+def _along(edge: Edge, x: Sum, most: float) -> Sum:
+    """What comes to the other end of an edge, in either direction."""
+    slope, whole = edge.slope, x.whole and edge.kept
+    if slope.__class__ is float and slope == 1.0 and edge.off is None:
+        whole = whole and bool(np.all(x.size <= most))
+        return Sum(x.value, x.size, x.error if whole else x.error + TWICE * x.size, whole)
+    steep = abs(slope)
+    size = _times(steep, x.size)
+    whole = whole and _is_whole(slope) and bool(np.all(size <= most))
+    error = _times(steep, x.error) if whole else _times(steep, x.error) + TWICE * size
+    return Sum(_times(slope, x.value), size, error if edge.off is None else error + _times(edge.off, x.size), whole)
 
 
-def _gather(sums: dict[Node, tuple[Any, Any, Any]], node: Node, adjoint: Any, paths: Any, error: Any) -> None:
+def _largest(nodes: Sequence[Node], more: int = 0) -> float:
+    """Whole numbers up to which all that comes together at a node can be added up as it is."""
+    return LARGEST / (SHORT * sum([len(node.edges) for node in nodes], 1 + more))
+
+
+def _is_whole(x: Any) -> bool:
+    """Whether all of this are whole numbers; large arrays are not looked through."""
+    if x.__class__ is float:
+        return x.is_integer()
+    return np.size(x) <= SHORT and bool(np.all(np.rint(x) == x))
+
+
+def _gather(sums: dict[Node, Sum], node: Node, part: Sum) -> None:
     """Add what comes to a node: its adjoint, the same along all paths without regard to sign, and its error."""
-    if node.shape or not isinstance(adjoint, float):
-        adjoint, paths, error = (_fitted(part, node.shape) for part in (adjoint, paths, error))
+    if node.shape or not isinstance(part.value, float):
+        value, size, error = (_fitted(x, node.shape) for x in (part.value, part.size, part.error))
+        part = Sum(value, size, error, part.whole)
     known = sums.get(node)
-    if known is not None:
-        adjoint, paths, error = known[0] + adjoint, known[1] + paths, known[2] + error
-    sums[node] = adjoint, paths, error
+    sums[node] = part if known is None else known + part
 
 
 def _fitted(part: Any, shape: Shape) -> Any:

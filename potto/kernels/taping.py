@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from potto.kernels.emit import ONE, Bend, Lines, Scalar, Tangents
+from potto.kernels.emit import ONE, Bend, Lines, Scalar, Tangents, exact_slopes
 
 
 class TapeLines(Lines):
@@ -16,14 +16,14 @@ class TapeLines(Lines):
     def __init__(self, rounding: bool) -> None:
         super().__init__(1, rounding)
 
-    def tangents(self, args: Sequence[Scalar], slopes: Mapping[int, str], bend: Bend) -> Tangents:
+    def tangents(self, op: str, args: Sequence[Scalar], slopes: Mapping[int, str], bend: Bend) -> Tangents:
         edges = []
         for i, slope in slopes.items():
             if args[i].t[0]:
                 bends = [(found, e) for j in slopes if (e := args[j].e) and (found := bend(i, j))]
                 off = self.total([f"abs({self.product(found, e)})" for found, e in bends])
                 edges.append((slope, args[i].t[0], off))
-        return self.linear(edges)
+        return self.linear(edges, exact_slopes(op, args, 0) is not None)
 
     def added(self, args: Sequence[Scalar]) -> Tangents:
         return self.linear([(ONE, x.t[0], None) for x in args if x.t[0]])
@@ -31,11 +31,11 @@ class TapeLines(Lines):
     def negated(self, x: Scalar) -> Tangents:
         return self.linear([("-1.0", x.t[0], None)] if x.t[0] else [])
 
-    def linear(self, edges: Sequence[tuple[str, str | None, str | None]]) -> Tangents:
+    def linear(self, edges: Sequence[tuple[str, str | None, str | None]], kept: bool = True) -> Tangents:
         if not edges:
             return self.none, self.none
         text = ", ".join(f"({slope}, {tangent}, {off})" for slope, tangent, off in edges)
-        return (self.let(f"{self.ufunc('tape.linear')}({text})", "t"),), self.none
+        return (self.let(f"{self.ufunc('tape.multiples' if kept else 'tape.linear')}({text})", "t"),), self.none
 
     def rounded(self, x: Scalar, op: str, args: Sequence[Scalar]) -> Scalar:
         found = super().rounded(Scalar(x.v, x.e, self.none, self.none), op, args)

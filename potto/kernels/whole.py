@@ -1,6 +1,7 @@
 """What an operation rounds off, where that is known better than as half a unit in the last place of its result.
 
-Owns `ROUNDING`, for each such operation a function of its value and its arguments, and `looked_through`. What a sum
+Owns `ROUNDING`, for each such operation a function of its value and its arguments, `slopes`, which says the same of a
+tangent, `FUNCTIONS`, all of them by name, and `looked_through`. What a sum
 rounds off is known exactly, term by term (Knuth's TwoSum), whatever cancels on the way: nothing in 2e8 - (1e8 + 0.5), 1
 in 1e16 + 1 - 1e16. Products, quotients and powers of whole numbers are exact where they are whole, so that 2*x is 6,
 and not 6 give or take something, where x is 3; a batch is looked through for those only where that is asked for.
@@ -17,6 +18,7 @@ from typing import Any
 import numpy as np
 
 UNIT_ROUNDOFF = 2.0**-53
+TWICE = 2 * UNIT_ROUNDOFF  # a product and the sum that it goes into
 LARGEST = 2.0**53  # up to here every whole number is a double
 HIGHEST = 64.0  # powers that are worked out again
 SHORT = 1024  # elements that are looked at one by one: what people read
@@ -119,9 +121,30 @@ def power(value: Any, base: Any, exponent: Any) -> Any:
     return UNIT_ROUNDOFF * abs(value)
 
 
+def slopes(tangent: Any, *factors: Any) -> Any:
+    """What a tangent rounds off that is a sum of slopes times tangents, given one after the other, where the slopes are
+    exact: nothing as long as all are whole, so that the slope of 2*x is 2, and not 2 give or take something."""
+    if isinstance(tangent, np.ndarray):
+        if tangent.size > _looking.most:
+            return TWICE * abs(tangent)
+        return np.where(_all_whole(*factors) & (_largest(tangent, factors) <= LARGEST), 0.0, TWICE * abs(tangent))
+    exact = _whole(*factors) and _largest(tangent, factors) <= LARGEST
+    return 0.0 if exact else TWICE * abs(tangent)
+
+
+def _largest(tangent: Any, factors: tuple[Any, ...]) -> Any:
+    """A bound of all that is met on the way to the tangent."""
+    size = abs(tangent)
+    for i in range(0, len(factors) if len(factors) > 2 else 0, 2):
+        size = size + abs(factors[i] * factors[i + 1])
+    return size
+
+
 ROUNDING: dict[str, Callable[..., Any]] = {
     "add": add,
     "mul": mul,
     "div": div,
     "pow": power,
 }
+
+FUNCTIONS = {**ROUNDING, "slopes": slopes}

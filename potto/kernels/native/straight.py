@@ -14,7 +14,7 @@ from typing import Any
 
 from msgspec import Struct
 
-from potto.kernels.whole import UNIT_ROUNDOFF
+from potto.kernels.whole import TWICE, UNIT_ROUNDOFF
 from potto.kernels.written import Kernel
 
 ARITHMETIC: dict[type, str] = {ast.Add: "add", ast.Sub: "sub", ast.Mult: "mul"}
@@ -30,7 +30,7 @@ FUNCTIONS = {
 }  # fmt: skip
 COMPARED = (*RELATIONS.values(), "and", "or", "not", "nan")
 CONSTANTS = ("inf", "nan", "True", "False")
-ZERO, HALF_ULP = repr(0.0), repr(UNIT_ROUNDOFF)
+ZERO, HALF_ULP, A_TANGENT = repr(0.0), repr(UNIT_ROUNDOFF), repr(TWICE)
 
 
 class NotStraight(Exception):
@@ -336,7 +336,9 @@ class _Operations:
 
     def call(self, function: str, args: tuple[str, ...], name: str) -> str:
         if function.startswith("whole_"):
-            return self.rounded_sum(*args, name=name) if function == "whole_add" else self.half_ulp(args[0], name)
+            if function == "whole_add":
+                return self.rounded_sum(*args, name=name)
+            return self.share(A_TANGENT if function == "whole_slopes" else HALF_ULP, args[0], name)
         if function == "potto_clamp":
             return self.new("min", (self.new("max", args[:2]), args[2]), name)
         if function == "sign":
@@ -346,14 +348,14 @@ class _Operations:
             raise NotStraight(function)
         return self.new(FUNCTIONS[function], args, name)
 
-    def half_ulp(self, value: str, name: str = "") -> str:
-        return self.new("mul", (HALF_ULP, self.new("abs", (value,))), name)
+    def share(self, part: str, value: str, name: str = "") -> str:
+        return self.new("mul", (part, self.new("abs", (value,))), name)
 
     def rounded_sum(self, value: str, first: str, *rest: str, name: str) -> str:
         """What `whole.add` says of a batch."""
         if len(rest) == 1:
-            return self.half_ulp(value, name)
-        off, total = self.half_ulp(value), first
+            return self.share(HALF_ULP, value, name)
+        off, total = self.share(HALF_ULP, value), first
         least = off
         for arg in rest[:-1]:
             longer = self.new("add", (total, arg))
