@@ -54,6 +54,15 @@ def test_a_hyperbola_close_to_its_asymptotes(t: float, box: str) -> None:
     assert abs(found.tangent - exact) <= found.tangent_error <= 1e-11 and found.converged
 
 
+@pytest.mark.parametrize("t", [1e-6, 1e-8, 1e-9, 1e-12])
+def test_a_small_part_that_is_steep_at_an_end_shows_beside_a_large_smooth_one(t: float) -> None:
+    """The area under x y adds t ln t, by t/x for x > t, to a form whose nodes move: there it was a part in a thousand,
+    and the large part's decay was taken for that of the whole."""
+    nested = "integral [0, 1] (integral [0, 1] (if [x*y >= t] then x*y + 1 else 1) d(y)) d(x)"
+    answer = potto.deriv(potto.compile(f"def f(t)\n    {nested}").f)((t, 1.0))
+    assert abs(answer.tangent - t * math.log(t)) <= answer.tangent_error <= 1e-10
+
+
 # Peaks along the roots of what has no single formula for them: (program, what is 0 at a peak, where the domain ends).
 ALONG_ROOTS = [
     ("integral [0, 1] exp(-(n*(sin(20*x) - 0.3))^2) d(x)", lambda x: mp.sin(20 * x) - mp.mpf("0.3"), 1),

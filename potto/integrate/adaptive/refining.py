@@ -135,7 +135,8 @@ def replaced(work: PanelBatch, old: Pieces, new: Pieces, order: int, tally: Tall
     """The new pieces that stand for the old ones, measured; the books follow."""
     copies = new.u0.size // old.u0.size
     new = work.measure(new, order)
-    if (graded := np.nonzero((new.end != 0) & (new.error <= PROMISING * new.size).all(axis=0))[0]).size:
+    promising = (new.error <= PROMISING * by_either_form(work, new.size)).all(axis=0)
+    if (graded := np.nonzero((new.end != 0) & promising)[0]).size:
         new.held_against(work.measure(new.places(graded), order + MORE), graded)
     if (rough := np.nonzero((np.abs(new.end) > GRADE) & (new.error > ROUGH * new.size).any(axis=0))[0]).size:
         level = new.places(rough)

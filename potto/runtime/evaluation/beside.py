@@ -1,15 +1,17 @@
 """Derivatives where nothing at the parameters tells them: what those beside the parameters lead to.
 
-Owns `led_to`, the `steps` that lead there, and values that are `moved`.
+Owns `approached`, and values that are `moved`.
 """
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
+from potto.diagnostics import PottoError
 from potto.kernels.cells import Array, Cell, Value, all_cells, map_cells
 
 APART = 2.0**-8
@@ -18,6 +20,10 @@ CLOSER = 2.0**-8  # each step by this part of the one before
 SETTLING, SAME = 0.75, 1e-6
 MISSED = 1 / 16  # the least part of what is extrapolated that may be wrong
 LEAP = 1e-9  # the part of a value that is no jump of it
+# How many places a smooth derivative is extrapolated from, each half as far as the one before, and the fewest of them:
+# from twelve that are 1/4 to 1/8192 away what is analytic as far as 1 has 12 digits, with what rounding leaves there.
+FINE, FEWEST = 12, 3
+UNNOTICED = 1e-8  # the part of derivatives by which those close by may be wrong with no word, where rounding hides it
 
 # Values, how far off they may be, their derivatives in a direction, and how far off those may be.
 Parts = tuple[Array, Array, Array, Array]
@@ -29,23 +35,35 @@ def parameter_step(values: Iterable[Value], d: int) -> float | None:
     return APART**2 * max([1.0, *sizes]) if sizes else None
 
 
-def steps(step: float) -> list[float]:
-    """Three steps towards the parameters."""
-    return [step * CLOSER**i for i in range(3)]
-
-
-def led_to(found: Sequence[Parts], here: tuple[Array, Array], step: float) -> tuple[Array, Array]:
+def approached(
+    at: Callable[[float], Parts], step: float, here: tuple[Array, Array], rtol: float | None = None
+) -> tuple[Array, Array]:
     """The derivatives on the side of the parameters on which a step is, and how far off they may be.
 
-    found: what there is after three steps, of which this is the last. here: the values at the parameters, and how far
-    off they may be. Where those beside them lead to another one the derivative is infinite.
+    at: what there is after a step. here: the values at the parameters, and how far off they may be. Where those beside
+    them lead to another one the derivative is infinite. rtol: as accurate as that where derivatives are smooth on that
+    side; else what three steps tell is enough.
     """
+    limit, missed = _led_to([at(step * CLOSER**i) for i in range(3)], here, step * CLOSER**2)
+    if rtol is None or not (np.isfinite(limit) & (missed > rtol * np.abs(limit))).any():
+        return limit, missed
+    finer = [step * APART**-1.75 * 0.5**i for i in range(FINE)]
+    try:
+        found = [at(h) for h in finer]
+    except PottoError:  # so far away there may be no value
+        return limit, missed
+    return _smooth(found, np.array(finer), limit, missed)
+
+
+def _led_to(found: Sequence[Parts], here: tuple[Array, Array], step: float) -> tuple[Array, Array]:
+    """What three steps towards the parameters, of which `step` is the last, lead to, and how far off that may be."""
     slopes = [np.where(np.isfinite(et), t, np.nan) for _, _, t, et in found]
     noise = np.sum([et for *_, et in found], axis=0)
     flat = zip(*(x.ravel() for x in (*slopes, noise)), strict=True)
     limits, missed = (np.reshape(x, noise.shape) for x in zip(*(_limit(*four) for four in flat), strict=True))
-    v, e, _, et = found[-1]
-    missed = np.where(np.isfinite(limits), missed + et, 0.0)
+    v, e, *_ = found[-1]
+    # Nearer by rounding is no less, even where nothing shows: sin(x*t)/t is x just beside t = 0, to the last digit.
+    missed = np.where(np.isfinite(limits), missed + np.max([et for *_, et in found], axis=0), 0.0)
     rough = np.abs(slopes[0] - slopes[1]) + found[0][3] + found[1][3]  # nearer by there may be nothing but rounding
     limits, missed = np.where(rough < missed, slopes[0], limits), np.where(rough < missed, rough, missed)
     with np.errstate(invalid="ignore"):
@@ -73,6 +91,32 @@ def moved(value: Value, step: float | Array, d: int) -> Value:
 def one_direction(value: Value, d: int) -> Value:
     """A value that moves in direction d alone, as its only one."""
     return map_cells(value, lambda cell: Cell(cell.v, cell.e, cell.t[d : d + 1], cell.et[d : d + 1]))
+
+
+def _smooth(found: Sequence[Parts], places: Array, limit: Array, missed: Array) -> tuple[Array, Array]:
+    """The limit of derivatives at places that shrink, and how far off it may be, where these are smooth: by polynomials
+    through neighbours among them, of which the one counts that changes the least when either end is left out. The limit
+    known before stays where nothing better is found, or another limit, which something nearer by has."""
+    slopes = np.array([np.where(np.isfinite(et), t, np.nan) for _, _, t, et in found])
+    noise = np.array([et for *_, et in found])
+
+    def through(first: int, end: int) -> tuple[Array, Array]:
+        near = places[first:end]
+        weights = np.array([np.prod([h / (h - own) for h in near if h != own]) for own in near])
+        return np.tensordot(weights, slopes[first:end], 1), np.tensordot(np.abs(weights), noise[first:end], 1)
+
+    best, off = limit, missed
+    size = UNNOTICED * np.fmax.reduce(np.abs(slopes))
+    for first, end in itertools.combinations(range(FINE + 1), 2):
+        if end - first < FEWEST:
+            continue
+        value, rounding = through(first, end)
+        change = np.fmax(*(np.abs(value - through(*fewer)[0]) for fewer in ((first + 1, end), (first, end - 1))))
+        apart = np.abs(value - limit)
+        less = change + rounding + np.where(apart <= missed + change + rounding, 0.0, apart)
+        better = (apart <= missed + change + rounding + size) & (less < off)
+        best, off = np.where(better, value, best), np.where(better, less, off)
+    return best, off
 
 
 def _limit(far: float, nearer: float, nearest: float, noise: float) -> tuple[float, float]:

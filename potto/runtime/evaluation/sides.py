@@ -17,7 +17,7 @@ from potto.diagnostics import PottoError
 from potto.integrate.events import OneSidedDerivatives, TwoSided
 from potto.kernels.cells import Array, Cell, Number, Value, all_cells, map_cells, pad
 from potto.runtime.evaluation.beside import SAME as ALIKE
-from potto.runtime.evaluation.beside import led_to, moved, one_direction, parameter_step, steps
+from potto.runtime.evaluation.beside import Parts, approached, moved, one_direction, parameter_step
 from potto.runtime.evaluation.linker import Linker
 from potto.runtime.evaluation.machine import Machine
 
@@ -61,7 +61,7 @@ def as_a_whole(machine: Machine, term: Term, given: Value, run: Run) -> Value:
             record.edges.append(_note(met[0].cause, where, backward, forward, before, beyond))
         _, _, slopes, off = _numbers(value, machine.directions)
         nearer = np.abs(slopes - backward) < np.abs(slopes - forward)
-        t = np.where(same, forward, np.where(nearer, backward, forward))
+        t = np.where(same, 0.5 * (backward + forward), np.where(nearer, backward, forward))
         et = np.where(same, np.maximum(before, beyond), np.where(nearer, before, beyond))
         if jumps:  # what is found beside the parameters has fewer digits: enough to know which side it is, or none
             near = (np.abs(slopes - t) <= off + et + ALIKE * np.abs(t)) & (et <= ALIKE * np.abs(slopes))
@@ -101,9 +101,13 @@ def _led_to(machine: Machine, given: Value, run: Run, value: Value, side: int) -
         step = parameter_step((given,), d)
         if step is None:
             continue
-        one, closer = one_direction(given, d), steps(side * step)
-        found = [_numbers(run(machine.apart().with_directions(1), moved(one, h, 0)), 1) for h in closer]
-        t[:, d], et[:, d] = led_to([(a, b, c[:, 0], off[:, 0]) for a, b, c, off in found], (v, e), closer[-1])
+
+        def at(h: float, d: int = d) -> Parts:
+            beside = run(machine.apart().with_directions(1), moved(one_direction(given, d), h, 0))
+            w, off, slopes, unsure = _numbers(beside, 1)
+            return w, off, slopes[:, 0], unsure[:, 0]
+
+        t[:, d], et[:, d] = approached(at, side * step, (v, e), machine.rtol)
     return t, et
 
 

@@ -71,7 +71,8 @@ def _noted(problem: Problem, sums: Sums, cause: TwoSided, members: Ints) -> Sums
                 sides[:, :, d] = 0.0 if step is None else np.nan
                 continue
             here = sums.pick(members)
-            (backward, before), (forward, beyond) = (beside(some, d, sign * step, here) for sign in (-1.0, 1.0))
+            both = (beside(some, d, sign * step, here, problem.machine.rtol) for sign in (-1.0, 1.0))
+            (backward, before), (forward, beyond) = both
         sides[:, :, d] = backward, forward, before, beyond
     backward, forward, before, beyond = sides
     if problem.machine.side:

@@ -24,7 +24,7 @@ from potto.integrate.events import BOUNDLESS, INNER, Degenerate, Fold, OneSidedD
 from potto.integrate.pieces import Sums, still
 from potto.integrate.plan import Plan
 from potto.kernels.cells import Array, Cell
-from potto.runtime.evaluation.beside import APART, SAME, led_to, moved, moving, parameter_step, steps
+from potto.runtime.evaluation.beside import APART, SAME, Parts, approached, moved, moving, parameter_step
 from potto.runtime.evaluation.machine import Machine
 from potto.runtime.integration.attempts import accurate
 from potto.runtime.integration.choices import orders
@@ -183,14 +183,18 @@ def _sides(problem: Problem, plan: Plan, members: Sequence[int], where: Fold | N
                 yield member, d, backward[:, 0], forward[:, 0], (before[:, 0], behind[:, 0])
 
 
-def beside(problem: Problem, d: int, step: float, here: Sums) -> tuple[Array, Array]:
+def beside(problem: Problem, d: int, step: float, here: Sums, rtol: float | None = None) -> tuple[Array, Array]:
     """The derivatives on the side of the parameters on which a step is, and how far off they may be, (m, B) each.
 
-    here: what there is at the parameters. Where the values beside them lead to another one it is infinite.
+    here: what there is at the parameters. Where the values beside them lead to another one it is infinite. rtol: see
+    `approached`.
     """
-    closer = steps(step)
-    found = [problem.beside({n: moved(v, h, d) for n, v in problem.env.items()}) for h in closer]
-    return led_to([(part.v, part.e, part.t[:, d], part.et[:, d]) for part in found], (here.v, here.e), closer[-1])
+
+    def at(h: float) -> Parts:
+        part = problem.beside({n: moved(v, h, d) for n, v in problem.env.items()})
+        return part.v, part.e, part.t[:, d], part.et[:, d]
+
+    return approached(at, step, (here.v, here.e), rtol)
 
 
 def _step(problem: Problem, plan: Plan, d: int, where: Fold | None) -> float | None:
