@@ -21,7 +21,7 @@ from potto.core.terms import (
 )  # fmt: skip
 from potto.kernels.cells import Pattern
 from potto.kernels.kinks import bends
-from potto.kernels.making import counts, making
+from potto.kernels.making import compiling, counts, making
 from potto.kernels.writing import Runtime, Writer
 from potto.kernels.written import Kernel, Written
 
@@ -48,7 +48,7 @@ def kernel(lam: Lam, patterns: tuple[Pattern, ...], directions: int, rounding: b
             _cache.move_to_end(key)
             counts.reused += 1
             return found
-    with making:
+    with making, compiling:
         name = repr(key).encode()
         written: Written | None = recall("kernels", name)
         if written is None:

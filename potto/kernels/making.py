@@ -1,7 +1,8 @@
 """What is made once and used again, and the time that takes: kernels, plans, proofs.
 
-Owns `making`, and `counts` of definitions linked, of kernels and of functions of machine code (which another thread
-makes). What is made on the way to something else counts once.
+Owns `making`, of that `compiling`, and `counts` of definitions linked, of kernels and of functions of machine code
+(which another thread makes). What is made on the way to something else counts once. Kernels are compiled a function at
+a time; the rest is about the whole of a scene: which surfaces cut what, and where they meet.
 """
 
 from __future__ import annotations
@@ -17,14 +18,15 @@ class Counts(Struct):
     recalled: int = 0  # found on disk
     reused: int = 0
     seconds: float = 0.0
+    kernel_seconds: float = 0.0  # of these
     native: int = 0
     kept: int = 0
     native_seconds: float = 0.0
     native_points: int = 0
     linked: int = 0
 
-    def so_far(self) -> tuple[int, int, int, int, float, int, int, int]:
-        made = self.linked, self.compiled, self.reused, self.recalled, self.seconds
+    def so_far(self) -> tuple[int, int, int, int, float, float, int, int, int]:
+        made = self.linked, self.compiled, self.reused, self.recalled, self.seconds, self.kernel_seconds
         return *made, self.native, self.kept, self.native_points
 
 
@@ -32,10 +34,13 @@ counts = Counts()
 
 
 class _Making(threading.local):
-    """`with making:` adds the time of the block, in this thread, to `counts.seconds`."""
+    """`with making:` adds the time of the block, in this thread, to those seconds of `counts`."""
 
     depth = 0
     start = 0.0
+
+    def __init__(self, seconds: str) -> None:
+        self.seconds = seconds
 
     def __enter__(self) -> None:
         if not self.depth:
@@ -45,7 +50,7 @@ class _Making(threading.local):
     def __exit__(self, *exc: object) -> None:
         self.depth -= 1
         if not self.depth:
-            counts.seconds += time.perf_counter() - self.start
+            setattr(counts, self.seconds, getattr(counts, self.seconds) + time.perf_counter() - self.start)
 
 
-making = _Making()
+making, compiling = _Making("seconds"), _Making("kernel_seconds")

@@ -28,7 +28,7 @@ from potto.runtime.evaluation.record import Record, watched
 from potto.runtime.integration.direct import Direct, SettledAround, SettledCall
 
 # What is not the same when the same is asked again.
-TIMES = {"seconds", "compile_seconds", "stats"}
+TIMES = {"seconds", "compile_seconds", "plan_seconds", "stats"}
 NUMBERS = float, int
 
 

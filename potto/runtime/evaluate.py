@@ -165,12 +165,13 @@ class Clock:
         return self
 
     def __exit__(self, *exc: object) -> None:
-        linked, compiled, reused, recalled, spent, native, kept, points = self.before
+        linked, compiled, reused, recalled, spent, kernels, native, kept, points = self.before
         self.seconds = time.perf_counter() - self.start
         self.linked = counts.linked - linked
         self.compiled, self.reused = counts.compiled - compiled, counts.reused - reused
         self.recalled = counts.recalled - recalled
         self.spent = counts.seconds - spent
+        self.planning = max(self.spent - (counts.kernel_seconds - kernels), 0.0)
         self.native, self.kept = counts.native - native, counts.kept - kept
         self.native_points = counts.native_points - points
 
@@ -183,8 +184,8 @@ def report(value: Value, machine: Machine, clock: Clock) -> Estimate:
     record = machine.record
     method = "exact" if not record.methods else "+".join(sorted(record.methods))
     answer = partial(
-        Estimate, evals=record.evaluations, seconds=clock.seconds, compile_seconds=clock.spent, method=method,
-        notes=tuple(_notes(record)), stats=stats_of(record, clock),
+        Estimate, evals=record.evaluations, seconds=clock.seconds, compile_seconds=clock.spent,
+        plan_seconds=clock.planning, method=method, notes=tuple(_notes(record)), stats=stats_of(record, clock),
     )  # fmt: skip
     if isinstance(value, Closure):
         kind = "derivative of a function" if isinstance(value, Derivative) else "function"

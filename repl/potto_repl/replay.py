@@ -16,7 +16,7 @@ PROMPT, CONTINUED = "po> ", "... "
 _NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e-?\d+)?")
 _MEASURED = re.compile(
     r".*\b(?:evaluations|recompiled|compiled), .*|(?:quadrature|mc|qmc|exact)\b.*"
-    r"|(?:parse|check|compile|link|evaluate|total)\b.*|\d+ kernels? made.*|.*report: .*"
+    r"|(?:parse|check|compile|link|plan|evaluate|total)\b.*|\d+ kernels? made.*|.*report: .*"
 )
 _DOUBT = re.compile(r"(?:±|\+/-|error at most) *(\([^)]*\)|[\d.e-]+)")
 

@@ -151,7 +151,7 @@ def test_check_where_numbers_are_small(talk):
 def test_time_has_the_phases(talk):
     talk("def f(t) integral [0, 1] [1.0173*x < t]*exp(0.0131*x) d(x)")  # no other test has left its kernels in memory
     data = talk.data(":time f(0.3)")
-    assert list(data["seconds"]) == ["parse", "check", "compile", "link", "evaluate"]
+    assert list(data["seconds"]) == ["parse", "check", "compile", "link", "plan", "evaluate"]
     assert all(spent >= 0 for spent in data["seconds"].values())
     assert data["stats"]["kernels compiled"] + data["stats"]["kernels from disk"] >= 1
     *_, linked, kernels, computed = talk(":time f(0.3)").text.splitlines()

@@ -14,7 +14,7 @@ from contextlib import contextmanager
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
-from potto.kernels.making import counts, making
+from potto.kernels.making import compiling, counts, making
 from potto.kernels.native import objects
 from potto.kernels.native.straight import NotStraight
 
@@ -78,7 +78,7 @@ class Promotion:
         """The function on its way, if it pays now that its text is known."""
         written = self._text
         if written is None:
-            with making:
+            with making, compiling:
                 written = self._text = text()
             self._cost = LEAST + LINE * written.count("\n")
         if not (now or self._pays()):

@@ -32,6 +32,7 @@ def joined(parts: Sequence[Estimate]) -> Estimate:
            for name in ("value", "error", "tangent", "tangent_error")},
         converged=all(part.converged for part in parts), evals=sum(part.evals for part in parts),
         seconds=sum(part.seconds for part in parts), compile_seconds=sum(part.compile_seconds for part in parts),
+        plan_seconds=sum(part.plan_seconds for part in parts),
         method="+".join(sorted({m for part in parts for m in part.method.split("+")} - {"exact"})) or "exact",
         notes=_notes(parts, sizes), stats=stats_of(parts), shortfalls=missed,
         member_converged=converged_members(missed, (sum(sizes),)),
@@ -49,7 +50,7 @@ def unfinished(like: Estimate, count: int) -> Estimate:
     return replace(
         like, value=unknown(like.value, np.nan), error=unknown(like.error, np.inf),
         tangent=unknown(like.tangent, np.nan), tangent_error=unknown(like.tangent_error, np.inf), converged=False,
-        evals=0, seconds=0.0, compile_seconds=0.0, notes=(), stats={},
+        evals=0, seconds=0.0, compile_seconds=0.0, plan_seconds=0.0, notes=(), stats={},
         shortfalls={INTERRUPTED: np.broadcast_to(True, (count,))}, member_converged=np.broadcast_to(False, (count,)),
     )  # fmt: skip
 

@@ -102,8 +102,8 @@ class Estimate(Operators, Struct, frozen=True, eq=False):
     converged: whether the accuracy asked for was reached, by all members of a batch; `reasons` says why not.
     member_converged: the same of each member, an array of the batch's shape; None for a single answer.
     shortfalls: why not, with what helps, and of which members of a batch, as a mask of its shape; True for all.
-    evals: evaluations of integrands. seconds, compile_seconds: time in all, and the part that went into what is
-        made once: plans, proofs, kernels.
+    evals: evaluations of integrands. seconds, compile_seconds, plan_seconds: time in all, the part that went into what
+        is made once (plans, proofs, kernels), and of that the part for plans: which surfaces cut what, where they meet.
     notes: what a careful reader should know (one-sided derivatives).
     """
 
@@ -115,6 +115,7 @@ class Estimate(Operators, Struct, frozen=True, eq=False):
     evals: int = 0
     seconds: float = 0.0
     compile_seconds: float = 0.0
+    plan_seconds: float = 0.0
     method: str = "exact"
     notes: tuple[OneSided, ...] = ()
     stats: dict[str, Any] = {}
@@ -370,6 +371,7 @@ def _combined(estimates: Sequence[Estimate], value: Any, error: Any) -> Estimate
             "member_converged": _members(wide, np.shape(value)), "evals": sum(e.evals for e in estimates),
             "seconds": sum(e.seconds for e in estimates), "method": "+".join(sorted(methods)) or "exact",
             "compile_seconds": sum(e.compile_seconds for e in estimates),
+            "plan_seconds": sum(e.plan_seconds for e in estimates),
             "notes": tuple(dict.fromkeys(note for e in estimates for note in e.notes)),
         }  # fmt: skip
     return _plain(first, changes)

@@ -126,6 +126,7 @@ def estimate_json(estimate: Estimate, type: str | None = None) -> dict[str, Any]
         "evals": estimate.evals,
         "seconds": round(estimate.seconds, 7),
         "compile_seconds": round(estimate.compile_seconds, 7),
+        "plan_seconds": round(estimate.plan_seconds, 7),
         "method": estimate.method,
         "type": type,
     }

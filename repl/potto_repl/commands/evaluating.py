@@ -85,7 +85,7 @@ def gradient(session: Conversation, text: str) -> Iterator[Part]:
 
 @command("time", argument="EXPR", completes="expression")
 def show_time(session: Conversation, text: str) -> Iterator[Part]:
-    """Show how long each step towards a value takes: parse, check, compile, link, evaluate."""
+    """Show how long each step towards a value takes: parse, check, compile, link, plan, evaluate."""
     text = plain_names(text)
     if not text:
         raise Refusal("an expression is missing", "write `:time EXPR`")
@@ -107,7 +107,8 @@ def show_time(session: Conversation, text: str) -> Iterator[Part]:
     _lap(phases, "link", start)
     linked = counts.linked - linked
     estimate = session.evaluate(text, session.settings).estimate
-    phases["compile"] += estimate.compile_seconds
+    phases["compile"] += estimate.compile_seconds - estimate.plan_seconds
+    phases["plan"] = estimate.plan_seconds
     phases["evaluate"] = max(estimate.seconds - estimate.compile_seconds, 0.0)
     total = sum(phases.values())
     rows = [f"{name:<9} {format_seconds(spent):>9}  {spent / total:4.0%}" for name, spent in phases.items()]
