@@ -221,3 +221,14 @@ def test_the_message_says_where() -> None:
     assert str(rate("integral [0, 1] abs(x*t) d(x)", 0.0).notes[0]) == (
         "the kink x*t = 0 lies all along `x`: the one-sided derivatives differ (-0.5 backward, 0.5 forward)"
     )
+
+
+def test_a_measure_at_a_kink_takes_what_its_density_takes() -> None:
+    """`uniform` asks first whether its range is one; what is then taken is one integral, whose sides are looked at once."""
+    spent = []
+    for over in ("(x ~ uniform(-n, n)) [x < t]", "[-n, n] [x < t]/(2*n)"):
+        found = potto.deriv(potto.compile(f"def f(t, n) integral {over} d(x)").f)((1.0, 1.0), (1.0, 0.0))
+        (note,) = found.notes
+        assert (note.backward, note.forward) == (0.5, 0.0)
+        spent.append(found.evals)
+    assert spent[0] == spent[1]

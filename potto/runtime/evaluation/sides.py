@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from potto.calculus.surfaces.trace import spine
-from potto.core.terms import App, Integral, Lam, Term
+from potto.core.terms import App, Hole, If, Integral, Lam, Term, postorder
 from potto.diagnostics import PottoError
 from potto.integrate.events import OneSidedDerivatives, TwoSided
 from potto.kernels.cells import Array, Cell, Number, Value, all_cells, map_cells, pad
@@ -72,10 +72,15 @@ def as_a_whole(machine: Machine, term: Term, given: Value, run: Run) -> Value:
 
 
 def _one_integral(linker: Linker, term: Term) -> bool:
-    """Whether a term is nothing but one integral, through the calls around it: then it has told its own derivatives."""
+    """Whether a term is nothing but one integral, through the calls around it: then it has told its own derivatives.
+    Of two by a condition that no integral takes part in (a range, and what to do where it is none) one is taken."""
     for _ in range(DEEPEST):
         while isinstance(term, Lam):
             term = term.body
+        if isinstance(term, If):
+            whole = not any(isinstance(node, App | Integral) for node in postorder(term.condition))
+            sides = (term.then, term.orelse)
+            return whole and all(isinstance(side, Hole) or _one_integral(linker, side) for side in sides)
         if not isinstance(term, App):
             break
         head, _ = spine(term)
