@@ -102,9 +102,8 @@ def show_stats(estimates: Sequence[Estimate], console: Console) -> None:
     seconds = sum(estimate.seconds for estimate in estimates)
     made = sum(estimate.compile_seconds for estimate in estimates)
     plans = sum(estimate.plan_seconds for estimate in estimates)
-    console.complain(
-        f"time: {seconds * 1e3:.2f} ms, of it made once: {plans * 1e3:.2f} ms for plans, {(made - plans) * 1e3:.2f} ms for kernels"
-    )
+    once = f"{plans * 1e3:.2f} ms for plans, {(made - plans) * 1e3:.2f} ms for kernels"
+    console.complain(f"time: {seconds * 1e3:.2f} ms, of it made once: {once}")
     found = totals(estimates)
     surfaces = found.pop("surfaces")
     console.complain(f"computed {computed_by(found)}")

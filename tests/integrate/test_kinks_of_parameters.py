@@ -224,7 +224,7 @@ def test_the_message_says_where() -> None:
 
 
 def test_a_measure_at_a_kink_takes_what_its_density_takes() -> None:
-    """`uniform` asks first whether its range is one; what is then taken is one integral, whose sides are looked at once."""
+    """`uniform` asks whether its range is one; what is then taken is one integral, whose sides are looked at once."""
     spent = []
     for over in ("(x ~ uniform(-n, n)) [x < t]", "[-n, n] [x < t]/(2*n)"):
         found = potto.deriv(potto.compile(f"def f(t, n) integral {over} d(x)").f)((1.0, 1.0), (1.0, 0.0))
