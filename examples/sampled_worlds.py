@@ -272,7 +272,7 @@ def mesh(xp: Any, place: Any) -> Any:
 
 TILTED = "pixel(tilted(t), camera(0, 1), \\(p, n, s) . lambert(p, n, s, lamp(0.2), 0.8), 0, -0.3, 0.2)"
 SPHERE = "pixel((0.2, 0.1, 1), t, Camera((0, 0, -2), 1), \\(p, n, s) . 1, 0.2, -0.1, 0.2)"
-SHADOW = "sharp(((0.3, 0.3, 1), (t, 0.35, 1), (0.4, 0.8, 1)), lamp(0.5), 0.9, 0.2, 0.25)"
+SHADOW = "sharp(Triangle((0.3, 0.3, 1), (t, 0.35, 1), (0.4, 0.8, 1)), lamp(0.5), 0.9, 0.2, 0.25)"
 SOFT = "soft((0.4, 0, 1), (0.6, 1, 1), lamp(t), 0.4, 0.3, 0.2, 0.2)"
 MESH = "by_constant([(0.1, 0.1), (t, 0.3), (0.3, 0.9)], [(0, 1, 2)], [[(0.5, 0.5, 0.5)]], [[(0.2, 0.2, 0.2)]])"
 WORLDS = (
