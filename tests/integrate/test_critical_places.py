@@ -163,3 +163,22 @@ def test_a_level_area_of_a_quartic(t: float) -> None:
     answer = potto.deriv(f)((t, 1.0))
     assert abs(answer.value - area) <= answer.error <= 1e-9 and answer.converged
     assert abs(answer.tangent - slope) <= answer.tangent_error + 1e-13 and answer.tangent_error <= 1e-9
+
+
+@pytest.mark.parametrize("order", ["x, y", "y, x"])
+def test_a_loop_that_is_as_small_as_its_parameter(order: str) -> None:
+    """Under x^3 + y^3 = t x y, whose points are x = t m/(1 + m^3), y = m x: a loop of area t^2/6, and left of it a
+    curve with another slope along -1e-8 < x < 0, where nothing is cut. It counts by 2e-9 of the derivative."""
+    t = mp.mpf(10) ** -8
+    last = mp.findroot(lambda m: t * m + 1 + m**3, -1 + t / 3)  # where x = -1
+
+    def slope(s: Any) -> Any:
+        """dy/dt dx by s, where m = e^s - 1."""
+        m = mp.exp(s) - 1
+        x = t * m / (1 + m**3)
+        return x * m * x / (3 * (m * x) ** 2 - t * x) * t * (1 - 2 * m**3) / (1 + m**3) ** 2 * mp.exp(s)
+
+    exact = mp.quad(slope, [*mp.linspace(mp.log(1 + last), mp.log(mp.mpf(1) / 2), 9), 0]) + t / 3
+    bounds = "[-1, 1], [0, 1]" if order == "x, y" else "[0, 1], [-1, 1]"
+    answer = derivative(f"def f(t) integral ({bounds}) [x^3 + y^3 <= t*x*y] d({order})", t=1e-8)
+    assert abs(answer.tangent - exact) <= answer.tangent_error + 4e-16 and answer.tangent_error <= 1e-11

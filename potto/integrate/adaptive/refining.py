@@ -18,6 +18,7 @@ import numpy as np
 from potto.integrate.adaptive.divergence import endless, given_up
 from potto.integrate.adaptive.refinement import Tally, doubtful, filled, missed_peak, stragglers, too_coarse
 from potto.integrate.adaptive.reynolds import Totals, sums, totals
+from potto.integrate.adaptive.short_neighbours import unseen
 from potto.integrate.adaptive.tails import paced
 from potto.integrate.columns import distinct
 from potto.integrate.degenerate.degeneracies import seems_to_step, steps_at_cuts
@@ -38,6 +39,7 @@ PROMISING = 1e-2
 # itself, however short the piece (`exp(t)` under a normal density).
 ROUGH, SMOOTH = 1e-8, 1e-12
 DOUBTFUL_ROUNDS = 8
+COUNTS = 0.01  # the part of what an error may be from which on it counts what was missed beside an end
 LONG = 8  # after how many halvings it is looked for members that take longer than the others
 
 
@@ -59,6 +61,8 @@ def integrated(work: PanelBatch) -> Sums:
         work.parent.extent.saw_values(size / (work.seg.b - work.seg.a), work.below(work.seg.owner))
     if not work.last and (work.conflict or work.paired or seems_to_step(work, fresh)):
         work.steps = steps_at_cuts(work, fresh)
+    if work.exact is None:
+        fresh = beside_short_ones(work, fresh)
     found = totals(work, fresh, ends)
     if good_enough(work, fresh, found, ends):
         return sums(work, found, ends)
@@ -77,6 +81,22 @@ def integrated(work: PanelBatch) -> Sums:
     else:
         found = totals(work, done, ends)
     return given_up(work, done, found, sums(work, found, ends))
+
+
+def beside_short_ones(work: PanelBatch, p: Pieces) -> Pieces:
+    """Whole segments, of which those are halved and graded that have missed something next to an end."""
+    missed = unseen(work, p)
+    if missed is None:
+        return p
+    owner, size = work.seg.owner[p.segment], by_either_form(work, p.size)
+    total = np.stack([np.bincount(owner, row, minlength=work.batch)[owner] for row in size])
+    least = np.maximum(8 * p.floor, COUNTS * np.maximum(work.machine.atol, work.machine.rtol * total))
+    left, right = ((part > least).any(axis=0) for part in missed)
+    if not (there := left | right).any():
+        return p
+    halves = halved(p.pick(there))
+    halves.end = np.concatenate((np.where(left[there], -GRADE, 0), np.where(right[there], GRADE, 0)))
+    return p.pick(~there).join(measured(work, halves, HALF_ORDER))
 
 
 def good_enough(work: PanelBatch, p: Pieces, found: Totals, ends: Ends | None) -> bool:
@@ -134,6 +154,14 @@ def refine(work: PanelBatch, fresh: Pieces, ends: Any, tally: Tally) -> Pieces:
 def replaced(work: PanelBatch, old: Pieces, new: Pieces, order: int, tally: Tally) -> Pieces:
     """The new pieces that stand for the old ones, measured; the books follow."""
     copies = new.u0.size // old.u0.size
+    new = measured(work, new, order)
+    new.excess, new.stuck = np.tile(old.excess, copies), np.tile(old.stuck, copies)
+    tally.replace(work, old, new)
+    return new
+
+
+def measured(work: PanelBatch, new: Pieces, order: int) -> Pieces:
+    """Pieces of segments, measured; those that are graded once more, with more nodes, or as they are."""
     new = work.measure(new, order)
     promising = (new.error <= PROMISING * by_either_form(work, new.size)).all(axis=0)
     if (graded := np.nonzero((new.end != 0) & promising)[0]).size:
@@ -144,8 +172,6 @@ def replaced(work: PanelBatch, old: Pieces, new: Pieces, order: int, tally: Tall
         level = work.measure(level, order).settled()
         smooth = (level.error <= SMOOTH * by_either_form(work, level.size)).all(axis=0)
         new.settled().put(rough[smooth], level.pick(smooth))
-    new.excess, new.stuck = np.tile(old.excess, copies), np.tile(old.stuck, copies)
-    tally.replace(work, old, new)
     return new
 
 

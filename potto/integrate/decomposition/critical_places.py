@@ -33,6 +33,7 @@ FEW = 256  # boxes up to which all sides of one are halved at once
 FINEST = 2.0**-40  # of the range: a box so narrow along the variable that is cut is not looked at more closely
 INFLATED = 0.1  # by how much a box is larger on which a solution is looked for: it may lie on the edge of one
 ROUNDED = 64 * EPS  # the same of the size of its place: a side that shrank to rounding holds no step of the operator
+SHRINKS = 0.5  # what a step leaves of a box on which it closes in on a solution, as it does quadratically
 SAME = 2.0**-44  # of the range: solutions no farther apart are one
 FLAT = 2.0**-20  # of its place: how long a box is in which what touches is 0 to rounding, at the most
 POLISH, STUCK = 12, 0.9  # steps at most; the part of each of its sides that the last one leaves of a box
@@ -131,8 +132,10 @@ class _Search(Struct):
                 break
             if owner.size > most or not within(owner.size):
                 return None
-            owner, box = self.narrowed(owner, box)
-            narrow = ~(box[0, 1] - box[0, 0] > np.maximum(tiny[owner], 4 * EPS * np.abs(box[0]).max(axis=0)))
+            owner, box, before = self.narrowed(owner, box)
+            side = box[0, 1] - box[0, 0]
+            narrow = ~(side > np.maximum(tiny[owner], 4 * EPS * np.abs(box[0]).max(axis=0)))
+            narrow &= ~(side <= SHRINKS * before)  # what closes in on a solution is on the way to be told
             self.leave(owner[narrow], box[:, :, narrow])
             owner, box = self.told(owner[~narrow], box[:, :, ~narrow])
             owner, box = self.halved(owner, box)
@@ -185,14 +188,15 @@ class _Search(Struct):
         found = enclosure(tuple(terms), at)
         return np.stack([np.stack([np.broadcast_to(end, owner.shape) for end in ends]) for ends in found])
 
-    def narrowed(self, owner: Ints, box: Array) -> tuple[Ints, Array]:
-        """What is left of boxes by one step; those with one solution are solved, and gone."""
+    def narrowed(self, owner: Ints, box: Array) -> tuple[Ints, Array, Array]:
+        """What is left of boxes by one step, and how long they were before along what is cut; those with one solution
+        are solved, and gone."""
         f = self.enclosed(self.equations, owner, box)
         may = ((f[:, 0] <= 0) & (f[:, 1] >= 0)).all(axis=0)
         owner, box = owner[may], box[:, :, may]
-        if not owner.size:
-            return owner, box
         side = box[:, 1] - box[:, 0]
+        if not owner.size:
+            return owner, box, side[0]
         with np.errstate(all="ignore"):
             more = INFLATED * side + ROUNDED * np.maximum(1.0, np.abs(box).max(axis=1))
             wide = np.stack((box[:, 0] - more, box[:, 1] + more), axis=1)
@@ -204,7 +208,7 @@ class _Search(Struct):
         gone = known & (lo > hi).any(axis=0)
         self.polished(owner[one & ~gone], step[:, :, one & ~gone])
         rest = ~(one | gone)
-        return owner[rest], np.stack((lo, hi), axis=1)[:, :, rest]
+        return owner[rest], np.stack((lo, hi), axis=1)[:, :, rest], side[0, rest]
 
     def step(self, owner: Ints, box: Array) -> Array:
         """Krawczyk's operator: m - C f(m) + (1 - C J(box)) (box - m); not finite where it can't be had."""

@@ -1,0 +1,71 @@
+"""Segments beside much shorter ones: what is small beyond an end is felt as near to it inside, between all nodes.
+
+Owns `unseen`. The loop of x^3 + y^3 = t x y is as long as t is. Left of it what lies under the curve has another slope
+over such a stretch, too, and no cut tells where: roots merge beside the real line. So where places that cut lie much
+closer together than a segment is long, the integrand is compared with what its nodes lead to at places nearer and
+nearer to that end.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from potto.integrate.panels.panel_batch import PanelBatch
+from potto.integrate.pieces import Pieces
+from potto.integrate.rules import substitution
+from potto.integrate.rules.substitution import Segments
+from potto.kernels.cells import Array, Bools, Ints
+
+SHORT = 2.0**-7  # of a segment: what is shorter has no node of its own there
+PLACES, FIRST = 12, 2.0**-5  # how many places are looked at, from where on
+ROUNDED = 8.0  # how many times farther than their rounding ends must lie apart
+
+
+def unseen(work: PanelBatch, p: Pieces) -> tuple[Array, Array] | None:
+    """What whole segments may have missed next to their left and to their right end, (C, S) each, where what lies
+    beyond is much shorter than they are; None where no segment has such a neighbour."""
+    seg = work.seg
+    if work.last or p.coefficients is None:
+        return None
+    length = seg.b - seg.a
+    sides, finite = _beyond(seg), seg.kind < substitution.UP
+    near = [np.nonzero(finite & (beyond < SHORT * length))[0] for beyond in sides]
+    if not any(there.size for there in near):
+        return None
+    found = np.zeros(p.error.shape), np.zeros(p.error.shape)
+    for missed, there, beyond, turned in zip(found, near, sides, (False, True), strict=True):
+        if there.size:
+            missed[:, there] = _missed(work, p, there, beyond[there] / length[there], turned)
+    return found
+
+
+def _beyond(seg: Segments) -> tuple[Array, Array]:
+    """How far it is from each end of every segment to what cuts, or turns, beyond it; infinite where nothing does."""
+    left, right = np.full((2, seg.a.size), np.inf)
+    same: Bools = seg.owner[1:] == seg.owner[:-1]
+    gap, length, off = seg.a[1:] - seg.b[:-1], seg.b - seg.a, ROUNDED * np.maximum(seg.ea, seg.eb)
+    left[1:] = np.where(same, np.where(gap > 0, gap, length[:-1]), np.inf)
+    right[:-1] = np.where(same, np.where(gap > 0, gap, length[1:]), np.inf)
+    for side, turns in ((left, seg.a - seg.left), (right, seg.right - seg.b)):
+        np.minimum(side, turns, out=side, where=turns > 0)
+    return np.where(left > off, left, np.inf), np.where(right > off, right, np.inf)
+
+
+def _missed(work: PanelBatch, p: Pieces, index: Ints, least: Array, turned: bool) -> Array:
+    """By how much the integrand is off its interpolant, integrated from the places next to an end to it: (C, I)."""
+    assert p.coefficients is not None
+    seg, coefficients = work.seg.pick(index), p.coefficients[:, index]
+    fall = (np.log(least) - np.log(FIRST)) / (PLACES - 1)
+    near = FIRST * np.exp(fall[:, None] * np.arange(PLACES))
+    u, rest = (1.0 - near, near) if turned else (near, 1.0 - near)
+    x, dx, label = substitution.points(seg, u, rest)
+    if seg.kind.any():
+        x = substitution.off_the_ends(seg, x)
+    h, inner = work.values(seg, index, x, label, dx)
+    functions = np.polynomial.legendre.legvander(2 * u - 1, coefficients.shape[-1] - 1)
+    led = np.einsum("cpk,pnk->cpn", coefficients, functions)
+    off = np.abs(h - led)
+    if inner is not None:
+        off = np.maximum(off - np.abs(inner), 0.0)
+    off = np.where(np.isfinite(off), off, 0.0)
+    return np.asarray((off * near).sum(axis=-1) * -fall)
