@@ -15,6 +15,7 @@ from potto.core.terms import (
     Const,
     Index,
     Length,
+    ListOf,
     Term,
     add,
     app,
@@ -22,6 +23,7 @@ from potto.core.terms import (
     array,
     const,
     data,
+    deriv,
     div,
     fold,
     global_,
@@ -29,6 +31,7 @@ from potto.core.terms import (
     if_,
     index,
     length,
+    list_of,
     mul,
     neg,
     postorder,
@@ -48,7 +51,7 @@ from potto.elaborate.values import Scope, Value
 from potto.modules.data import data_file
 from potto.syntax import nodes
 from potto.types.loading import type_of
-from potto.types.types import ANY_SIZE, AnySize, ArrayOf, TupleOf, Type, resolve
+from potto.types.types import ANY_SIZE, AnySize, ArrayOf, TupleOf, Type, holds_functions, resolve
 from potto.types.vectors import place_in
 
 
@@ -82,17 +85,40 @@ def shaped(elaboration: Elaboration, shape: TupleOf, parts: Sequence[Term]) -> T
     return app(global_(record.file, record.name), tuple(parts))
 
 
-def standing(elaboration: Elaboration, whole: Term) -> Term:
+def standing(elaboration: Elaboration, whole: Term, type: Type) -> Term:
+    """The dual of a value that stands still: with tangents that are 0; where there are functions in it, its parts with
+    theirs, and the functions derived."""
+    if not holds_functions(type):
+        return tuple_((whole, zeros(elaboration, whole, type)))
+    match resolve(type):
+        case TupleOf(items):
+            parts = enumerate(items)
+            return tuple_([standing(elaboration, _part(elaboration, whole, n), item) for n, item in parts])
+        case ArrayOf(_, item):
+            return _each(elaboration, whole, lambda element: standing(elaboration, element, item))
+        case _:
+            return deriv(whole)
+
+
+def zeros(elaboration: Elaboration, whole: Term, type: Type) -> Term:
     """The tangent of a value that stands still: a value like it, of zeros."""
-    shape = elaboration.shapes.of(whole)
-    if isinstance(shape, TupleOf):
-        parts = [_part(elaboration, whole, place) for place in range(len(shape.items))]
-        return shaped(elaboration, shape, [standing(elaboration, part) for part in parts])
-    if isinstance(shape, ArrayOf):
-        place = elaboration.fresh("k")
-        elaboration.numbers.add(place)
-        return array(place, length(whole), standing(elaboration, index(whole, var(place))))
-    return ZERO
+    match resolve(type):
+        case TupleOf(items) as shape:
+            parts = [zeros(elaboration, _part(elaboration, whole, n), item) for n, item in enumerate(items)]
+            return shaped(elaboration, shape, parts)
+        case ArrayOf(_, item):
+            return _each(elaboration, whole, lambda element: zeros(elaboration, element, item))
+        case _:
+            return ZERO
+
+
+def _each(elaboration: Elaboration, whole: Term, made: Callable[[Term], Term]) -> Term:
+    """An array of what is made of each element of another one."""
+    if isinstance(whole, ListOf):
+        return list_of(map(made, whole.items))
+    place = elaboration.fresh("k")
+    elaboration.numbers.add(place)
+    return array(place, length(whole), made(index(whole, var(place))))
 
 
 def _part(elaboration: Elaboration, whole: Term, place: int) -> Term:

@@ -148,8 +148,8 @@ def _with_tangents(elaboration: Elaboration, function: Term, args: tuple[Term, .
         return args
     found = list(args)
     for place, (arg, wanted) in enumerate(zip(args, expected)):
-        if lacks_tangents(elaboration.shapes.of(arg), wanted):
-            found[place] = tuple_((arg, standing(elaboration, arg)))
+        if lacks_tangents(given := elaboration.shapes.of(arg), wanted):
+            found[place] = standing(elaboration, arg, given)
         elif is_dual(wanted) and _is_number(elaboration, arg):
             found[place] = tuple_((arg, ZERO))
     return tuple(found)

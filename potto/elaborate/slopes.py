@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from functools import partial
 
-from potto.core.terms import ONE, ZERO, Term, Var, app, array, deriv, hole, index, length, proj, tuple_, var
-from potto.elaborate.arrays import shaped
+from potto.core.terms import ONE, Term, Var, app, array, deriv, hole, index, length, proj, tuple_, var
+from potto.elaborate.arrays import shaped, standing, zeros
 from potto.elaborate.builtins import parameters_of
 from potto.elaborate.conditions import choose, compare
 from potto.elaborate.context import Elaboration, lambdas
@@ -145,15 +145,15 @@ class _Slope:
         def moved(tangent: Term) -> Term:
             other = self._place()
             here = compare("==", var(other), var(place))
-            rest = self.zero(item, index(term, var(other)))
+            rest = zeros(self.elaboration, index(term, var(other)), item)
             return along(array(other, length(term), choose(here, tangent, rest, False, lambda _, __: None)))
 
         return array(place, length(term), self.each(item, index(term, var(place)), moved))
 
     def _item(self, whole: TupleOf, term: Term, place: int, along: Along) -> Term:
         def moved(tangent: Term) -> Term:
-            zeros = [self.zero(item, proj(term, number)) for number, item in enumerate(whole.items)]
-            return along(shaped(self.elaboration, whole, [*zeros[:place], tangent, *zeros[place + 1 :]]))
+            rest = [zeros(self.elaboration, proj(term, number), item) for number, item in enumerate(whole.items)]
+            return along(shaped(self.elaboration, whole, [*rest[:place], tangent, *rest[place + 1 :]]))
 
         return self.each(whole.items[place], proj(term, place), moved)
 
@@ -164,25 +164,6 @@ class _Slope:
 
     def dual(self, term: Term, type: Type, tangent: Term | None) -> Term:
         """A parameter with its tangent; None: it rests, as all do in which there are functions."""
-        if not holds_functions(type):
-            return tuple_((term, self.zero(type, term) if tangent is None else tangent))
-        match resolve(type):
-            case TupleOf(items):
-                return tuple_([self.dual(proj(term, place), item, None) for place, item in enumerate(items)])
-            case ArrayOf(_, item):
-                place = self._place()
-                return array(place, length(term), self.dual(index(term, var(place)), item, None))
-            case _:
-                return deriv(term)
-
-    def zero(self, type: Type, term: Term) -> Term:
-        """The tangent of what rests, in its shape."""
-        match resolve(type):
-            case TupleOf(items) as whole:
-                parts = [self.zero(item, proj(term, place)) for place, item in enumerate(items)]
-                return shaped(self.elaboration, whole, parts)
-            case ArrayOf(_, item):
-                place = self._place()
-                return array(place, length(term), self.zero(item, index(term, var(place))))
-            case _:
-                return ZERO
+        if tangent is None or holds_functions(type):
+            return standing(self.elaboration, term, type)
+        return tuple_((term, tangent))

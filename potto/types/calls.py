@@ -45,6 +45,7 @@ from potto.types.types import (
     Unknown,
     function,
     groups_of,
+    holds_functions,
     resolve,
     without_d,
 )
@@ -365,7 +366,9 @@ class _Filling:
                 self._sized_by(place, expected),
             )
             if lacks_tangents(self.types[place], expected):
-                said = replace(said, help="give its tangents as well: `(value, tangents)`")
+                apart = "give the duals of its parts: `(value, tangent)` for a number, `deriv(f)` for a function `f`"
+                help = apart if holds_functions(expected) else "give its tangents as well: `(value, tangents)`"
+                said = replace(said, help=help)
             self.inference.report(said)
 
     def _sized_by(self, place: int, expected: Type) -> tuple[Related, ...]:

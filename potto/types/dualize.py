@@ -6,11 +6,14 @@ jumps, its tangent has deltas. What must be plain is the values alone: a tangent
 
 from __future__ import annotations
 
+from typing import TypeGuard
+
 from potto.types.algebra import flat, inputs_of, merge, ports_in, symbolic
 from potto.types.apply import call
 from potto.types.types import ArrayOf, Parameter, TupleOf, Type, groups_of, resolve, result_of
 from potto.types.values import (
     HAZY,
+    STILL,
     Abstract,
     Choice,
     Closure,
@@ -42,6 +45,19 @@ def dual(value: Value) -> Value:
             return Choice(tuple(dual(option) for option in options))
         case _:
             return value
+
+
+def resting(value: Value) -> Value:
+    """The dual of what is given without tangents: they are 0, and functions are derived."""
+    if not _holds_functions(value):
+        return TupleValue((value, STILL))
+    match value:
+        case TupleValue(items):
+            return TupleValue(tuple(map(resting, items)))
+        case ListValue(item):
+            return ListValue(resting(item))
+        case _:
+            return dual(value)
 
 
 def slope_value(value: Value, type: Type) -> Value:
@@ -77,14 +93,14 @@ def _shaped(value: Scalar, type: Type) -> Value:
 
 def _transposed(duals: tuple[Value, ...]) -> Value:
     """The dual of a tuple from those of its items: the tuple of values, then the tuple of tangents."""
-    pairs = [dual.items for dual in duals if isinstance(dual, TupleValue) and len(dual.items) == 2]
+    pairs = [dual.items for dual in duals if _is_transposed(dual)]
     if len(pairs) != len(duals):
         return TupleValue(duals)
     return TupleValue((TupleValue(tuple(p[0] for p in pairs)), TupleValue(tuple(p[1] for p in pairs))))
 
 
 def _transposed_ports(duals: tuple[PortTree, ...]) -> PortTree:
-    pairs = [dual.items for dual in duals if isinstance(dual, PortTuple) and len(dual.items) == 2]
+    pairs = [d.items for d in duals if isinstance(d, PortTuple) and len(d.items) == 2 and not _has_functions(d)]
     if len(pairs) != len(duals):
         return PortTuple(duals)
     return PortTuple((PortTuple(tuple(p[0] for p in pairs)), PortTuple(tuple(p[1] for p in pairs))))
@@ -92,9 +108,26 @@ def _transposed_ports(duals: tuple[PortTree, ...]) -> PortTree:
 
 def _columns(dual: Value) -> Value:
     """The dual of an array from that of its elements: the array of values, then the array of tangents."""
-    if isinstance(dual, TupleValue) and len(dual.items) == 2:
-        return TupleValue(tuple(ListValue(part) for part in dual.items))
-    return ListValue(dual)
+    return TupleValue(tuple(map(ListValue, dual.items))) if _is_transposed(dual) else ListValue(dual)
+
+
+def _is_transposed(dual: Value) -> TypeGuard[TupleValue]:
+    """Whether a dual is a value and its tangent; one with functions in it has its parts side by side."""
+    return isinstance(dual, TupleValue) and len(dual.items) == 2 and not _holds_functions(dual)
+
+
+def _holds_functions(value: Value) -> bool:
+    match value:
+        case TupleValue(items):
+            return any(map(_holds_functions, items))
+        case ListValue(item):
+            return _holds_functions(item)
+        case _:
+            return not isinstance(value, Scalar)
+
+
+def _has_functions(tree: PortTree) -> bool:
+    return any(map(_has_functions, tree.items)) if isinstance(tree, PortTuple) else isinstance(tree, PortFunction)
 
 
 class _Dual:

@@ -13,7 +13,7 @@ from potto.types.algebra import flat, jumps_of, merge, still
 from potto.types.apply import call
 from potto.types.calls import callee_name
 from potto.types.context import Plan
-from potto.types.dualize import dual, slope_value
+from potto.types.dualize import dual, resting, slope_value
 from potto.types.flow import Walk, walks
 from potto.types.flow_arrays import element
 from potto.types.rules import lone_delta, nonlinear
@@ -65,7 +65,7 @@ def _apply(walk: Walk, node: nodes.Apply) -> Value:
 def _given(walk: Walk, argument: nodes.Expr) -> Value:
     """The value of an argument; with tangents that are 0 where a derivative is given none."""
     value = walk.value(argument)
-    return TupleValue((value, STILL)) if id(argument) in walk.inference.still else value
+    return resting(value) if id(argument) in walk.inference.still else value
 
 
 def _builtin(walk: Walk, node: nodes.Apply, name: str, arguments: Sequence[Value]) -> Value:

@@ -1,4 +1,5 @@
-"""Tuples and records without tangents where a derivative takes them with some: they stand still, as a number does.
+"""Tuples and records without tangents where a derivative takes them with some: they stand still, as a number does, and
+the functions in them are derived.
 
 Owns `lacks_tangents` and `is_dual`, which types and elaboration both ask, and `stands_still`, whether a call may leave
 them out. A pair of numbers could be a number with its tangent: what is expected decides. So the derivative has to be
@@ -13,14 +14,64 @@ from potto.syntax.written import without_parentheses
 from potto.types.context import Inference
 from potto.types.motionless import head_of
 from potto.types.scope import Builtin, Global, Local, Meaning
-from potto.types.types import UNKNOWN, ArrayOf, Dist, Meta, Real, TupleOf, Type, resolve
+from potto.types.types import (
+    REAL,
+    UNKNOWN,
+    ArrayOf,
+    Dist,
+    Function,
+    Meta,
+    Parameter,
+    Real,
+    TupleOf,
+    Type,
+    holds_functions,
+    resolve,
+)
 from potto.types.unify import unify
 
 
 def lacks_tangents(actual: Type, expected: Type) -> bool:
-    """Whether a tuple or a record is given for itself and its tangents."""
-    values = values_of(expected)
+    """Whether a tuple or a record is given for itself and its tangents, or an array that holds functions for theirs."""
+    values = _values_like(actual, expected)
     return values is not None and _alike(actual, values)
+
+
+def _values_like(actual: Type, expected: Type) -> Type | None:
+    """What is expected together with its tangents; None for what is not told from it: numbers, arrays of numbers, and
+    functions by themselves. Where there are functions in it its dual has no record's name, and that of what is given is
+    taken."""
+    wanted, given = resolve(expected), resolve(actual)
+    if not holds_functions(wanted):
+        return values_of(wanted)
+    return _primal(wanted, given) if isinstance(wanted, TupleOf | ArrayOf) else None
+
+
+def _primal(dual: Type, like: Type) -> Type | None:
+    """The type that has this one as its dual, with the records' names of another one."""
+    dual, like = resolve(dual), resolve(like)
+    if not holds_functions(dual):
+        if not isinstance(dual, TupleOf) or len(dual.items) != 2 or not _alike(*dual.items):
+            return None
+        return REAL if isinstance(resolve(dual.items[0]), Real | Dist) else dual.items[0]
+    match dual:
+        case TupleOf(items):
+            if not isinstance(like, TupleOf) or len(like.items) != len(items):
+                return None
+            parts = [_primal(item, other) for item, other in zip(items, like.items)]
+            found = tuple([part for part in parts if part is not None])
+            return TupleOf(found, record=like.record) if len(found) == len(parts) else None
+        case ArrayOf(size, item):
+            part = _primal(item, like.item) if isinstance(like, ArrayOf) else None
+            return None if part is None else ArrayOf(size, part)
+        case Function(parameters, result):
+            if not isinstance(like, Function) or len(like.parameters) != len(parameters):
+                return None
+            taken = [_primal(p.type, q.type) for p, q in zip(parameters, like.parameters)]
+            given, made = tuple([Parameter(None, t) for t in taken if t is not None]), _primal(result, like.result)
+            return None if made is None or len(given) < len(taken) else Function(given, made)
+        case _:
+            return None
 
 
 def is_dual(expected: Type) -> bool:
@@ -57,13 +108,19 @@ def _alike(a: Type, b: Type, guess: bool = False) -> bool:
             return all(_alike(item, other, guess) for item, other in zip(items, b.items))
         case ArrayOf(item=item):
             return isinstance(b, ArrayOf) and _alike(item, b.item, guess)
+        case Function(parameters, result):
+            if not isinstance(b, Function) or len(parameters) != len(b.parameters):
+                return False
+            fits = (_alike(p.type, q.type, guess) for p, q in zip(parameters, b.parameters))
+            return all(fits) and _alike(result, b.result, guess)
         case _:
             return False
 
 
 def stands_still(inference: Inference, call: nodes.Apply, argument: nodes.Expr, expected: Type) -> bool:
     """Whether an argument of a derivative is given without tangents, and that can be seen wherever it is looked at."""
-    values, found = values_of(expected), inference.types[id(argument)]
+    found = inference.types[id(argument)]
+    values = _values_like(found, expected)
     if values is None or not _alike(found, values, guess=True) or _alike(found, expected, guess=True):
         return False
     known = _evident(inference, argument) and _of_a_definition(inference, head_of(inference, call))
@@ -103,7 +160,7 @@ def _evident(inference: Inference, expr: nodes.Expr) -> bool:
     if isinstance(resolve(inference.types.get(id(expr), UNKNOWN)), Real | Dist):
         return True
     match expr:
-        case nodes.Tuple(items=items):
+        case nodes.Tuple(items=items) | nodes.ListLiteral(items=items):
             return all(_evident(inference, item) for item in items)
         case nodes.Name():
             meaning = _meaning(inference, expr)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import assert_never
+from typing import TypeGuard, assert_never
 
 from potto.quick import quick, value
 
@@ -181,9 +181,14 @@ def shifted(size: Type, offset: int) -> Type:
 
 def dual_of_array(size: Type, dual: Type) -> Type:
     """The dual of an array of items with this dual: the array of values, then the array of tangents."""
-    if isinstance(dual, TupleOf) and len(dual.items) == 2:
+    if _is_transposed(dual):
         return TupleOf(tuple(ArrayOf(size, part) for part in dual.items), dual=True)
     return ArrayOf(size, dual)
+
+
+def _is_transposed(dual: Type) -> TypeGuard[TupleOf]:
+    """Whether a dual is a value and its tangent; one with functions in it has its parts side by side."""
+    return isinstance(dual, TupleOf) and len(dual.items) == 2 and not holds_functions(dual)
 
 
 def function(groups: Iterable[tuple[Parameter, ...]], result: Type) -> Type:
@@ -261,7 +266,7 @@ def dual_of_tuple(duals: tuple[Type, ...], dual: bool = False, record: RecordNam
 
     What is not a tuple of numbers (a function in it, something wrong) keeps its duals side by side.
     """
-    pairs = [d.items for d in duals if isinstance(d, TupleOf) and len(d.items) == 2]
+    pairs = [d.items for d in duals if _is_transposed(d)]
     if len(pairs) != len(duals):
         return TupleOf(duals, dual)
     values, tangents = (TupleOf(tuple(p[place] for p in pairs), record=record) for place in (0, 1))

@@ -43,3 +43,14 @@ def part(a, b) [a < b]*a^2*b
 def f(t) integral [0, 1] snd(deriv(part)(x, (t, 1))) d(x)
 """)
     assert abs(m.f(0.5).value - (0.5**3 / 3 + 0.5**3)) <= 1e-15
+
+
+@pytest.mark.parametrize(
+    "place",
+    ["[x, 2][i]", "(if i == 0 then x else 2)", "(if i == 0 then x else if t > 1 then 2 else x^2)"],
+)
+def test_a_delta_whose_place_is_chosen_has_the_roots_of_each_choice(place: str) -> None:
+    """x^2 t = 1/2 at sqrt(1/2t), 2 x t = 1/2 at 1/4t: x^2/(2 x t) + 2 x/2t = sqrt(1/8 t^3) + 1/4t^2."""
+    m = potto.compile(f"def f(t) integral [0, 1] (sum i in 0..1 (delta(x*t*{place} - 0.5)*{place}*x)) d(x)")
+    got = potto.grad(m.f)(2.0)
+    assert abs(got.value - 3 / 16) <= 1e-15 and abs(got.tangent - (-3 / 32 - 1 / 16)) <= 1e-15

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 from marks import check
@@ -50,6 +52,64 @@ def test_what_stands_still(text: str, value: float, tangent: float) -> None:
     found = world.evaluate(key, text).estimate
     whole = found.value if found.tangent is None else (found.value, found.tangent)
     assert whole == pytest.approx((value, tangent), rel=1e-12)
+
+
+HOLDERS = """
+record P(w: Real, f: Real -> Real)
+square = \\x . x*x
+step = \\y . [y > 0.5]
+def h(p: P, t) p.w*t + (p.f)(t)
+def g(q: (Real, Real -> Real), t) fst q*t + (snd q)(t)
+def two(fs: [2] (Real -> Real), t) (fs[0])(t) + t*(fs[1])(t)
+def all(ps: [n] P, t) sum p in ps ((p.f)(t*p.w))
+def on(p: P, t) 3*h(p, t)
+def chosen(p: P, a, t) (if a > 0 then p.f else square)(t)
+def apply(f: Real -> Real, t) f(t)
+def handed(f: Real -> Real, t) 2*apply(f, t)
+one = P(1, step)
+scene = [P(1, step), P(2, step)]
+"""
+
+
+@pytest.mark.parametrize(
+    ("text", "value", "tangent"),
+    [
+        ("deriv(h)(P(w=3, f=square), (2, 1))", 10, 7),
+        ("deriv(h)(P(3, square) with w = 4, (2, 1))", 12, 8),
+        ("deriv(g)((3, square), (2, 1))", 10, 7),
+        ("deriv(g)(((3, 1), deriv(square)), (2, 1))", 10, 9),
+        ("deriv(two)([square, square], (2, 1))", 12, 16),
+        ("deriv(all)([P(1, square), P(2, square)], (2, 1))", 20, 20),
+        ("deriv(all)([((1, 1), deriv(square)), ((2, 0), deriv(square))], (2, 1))", 20, 28),
+    ],
+)
+def test_functions_in_what_stands_still_are_derived(text: str, value: float, tangent: float) -> None:
+    world = World()
+    found = world.evaluate(world.put("<text>", HOLDERS), text).estimate
+    assert (found.value, found.tangent) == pytest.approx((value, tangent), rel=1e-12)
+
+
+# At t = 2 and y = x t the step jumps where x = 1/4: its delta gives x/|dy/dx| = 1/8.
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("snd(deriv(h)(one, (x*t, x)))", 1 / 2 + 1 / 8),
+        ("snd(deriv(h)(P(x, step), (x*t, x)))", 1 / 3 + 1 / 8),
+        ("D(h, t)(P(x, step), x*t)*x", 1 / 3 + 1 / 8),
+        ("snd(deriv(g)(((1, 0), deriv(step)), (x*t, x)))", 1 / 2 + 1 / 8),
+        ("snd(deriv(two)([step, step], (x*t, x)))", 1 / 8 + (1 - 1 / 16) / 2 + 1 / 16),
+        ("snd(deriv(all)(scene, (x*t, x)))", 1 / 8 + 1 / 16),
+        ("snd(deriv(all)([P(x, step), P(2, step)], (x*t, x)))", 1 / 8 + 1 / 16),  # of x^2 t, at 1/2: x^2/(2 x t)
+        ("D(all, t)([P(1, step), P(2, sin)], x*t)*x", 1 / 8 + (4 * math.sin(4) + math.cos(4) - 1) / 8),
+        ("snd(deriv(on)(one, (x*t, x)))", 3 * (1 / 2 + 1 / 8)),
+        ("D(on, t)(one, x*t)*x", 3 * (1 / 2 + 1 / 8)),
+        ("snd(deriv(chosen)(one, 1, (x*t, x)))", 1 / 8),
+        ("snd(deriv(handed)(deriv(step), (x*t, x)))", 2 / 8),
+    ],
+)
+def test_jumps_of_functions_that_are_held_or_handed_on_count_under_an_integral(text: str, value: float) -> None:
+    module = potto.compile(f"{HOLDERS}def f(t) integral [0, 1] {text} d(x)")
+    assert module.f(2.0).value == pytest.approx(value, rel=1e-12, abs=0)
 
 
 def test_from_python() -> None:

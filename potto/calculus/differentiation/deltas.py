@@ -22,12 +22,14 @@ from potto.core.terms import (
     ZERO,
     Branch,
     Delta,
+    If,
     Integral,
     Sum,
     Term,
     Tuple,
     children,
     delta,
+    if_,
     neg,
     postorder,
     prim,
@@ -50,7 +52,7 @@ def without_deltas(node: Integral, folding: bool = False) -> Term:
     PottoError (P0505). folding: also where roots merge as the other variables vary."""
     if not any(isinstance(n, Delta) for n in postorder(node.body)):
         return node
-    body = _inner_first(node.body, folding)
+    body = transform(_inner_first(node.body, folding), lambda _, new: _chosen(new) if isinstance(new, Delta) else new)
     if body is not node.body:
         node = with_integrand(node, body)
     parts: list[Term] = []
@@ -75,6 +77,24 @@ def without_leftovers(term: Term) -> Term:
         return () if isinstance(node, Integral) and level_sets.level_set(node) is not None else children(node)
 
     return transform(term, lambda _, new: ZERO if isinstance(new, Delta) else new, below)
+
+
+def _chosen(what: Delta) -> Term:
+    """A delta whose place a plain condition chooses, as a choice between deltas: each has its roots."""
+    choice = next((node for node in postorder(*what.coordinates) if isinstance(node, If)), None)
+    if choice is None:
+        return what
+
+    def side(then: bool) -> Term:
+        def taken(_: Term, new: Term) -> Term:
+            here = isinstance(new, If) and new.condition is choice.condition
+            return (new.then if then else new.orelse) if here and isinstance(new, If) else new
+
+        found = transform(what, taken)
+        assert isinstance(found, Delta)
+        return _chosen(found)
+
+    return if_(choice.condition, side(True), side(False))
 
 
 def _inner_first(body: Term, folding: bool) -> Term:

@@ -23,8 +23,10 @@ from potto.core.terms import (
     fresh,
     if_,
     index,
+    list_of,
     postorder,
     prim,
+    proj,
     transform,
     var,
 )
@@ -54,6 +56,9 @@ def _pushed(function: Term, args: tuple[Term, ...], resolve: Resolve) -> Term:
             known = named(whole, resolve) if isinstance(whole, Global) else whole
             if isinstance(known, Tuple):
                 return app(known.items[number], args)
+            if isinstance(known, Index) and isinstance(known.array, ListOf):
+                parts = list_of(proj(item, number) for item in known.array.items)
+                return _pushed(index(parts, known.index), args, resolve)
     return app(function, args)
 
 

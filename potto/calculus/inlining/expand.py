@@ -6,17 +6,49 @@ Owns `expanded`, `Expansion`, `Calls`, `known_function`, `named` and `heads_of`.
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import chain
 
 from potto.calculus.inlining.currying import arguments_of, sizes_of, uncurry
 from potto.calculus.surfaces.trace import spine
 from potto.core.binders import Bound, apart
-from potto.core.terms import App, Deriv, Global, Lam, Proj, Term, Var, children, postorder, proj, rebuild, substitute
+from potto.core.terms import (
+    App,
+    Array,
+    Const,
+    Deriv,
+    Global,
+    If,
+    Index,
+    Lam,
+    ListOf,
+    Proj,
+    Term,
+    Tuple,
+    Var,
+    children,
+    const,
+    deriv,
+    fresh,
+    index,
+    lam,
+    list_of,
+    postorder,
+    proj,
+    rebuild,
+    substitute,
+    transform,
+    tuple_,
+    var,
+)
 
 # The term of another definition: its skeleton, or all of it.
 Resolve = Callable[[Global], "Term | None"]
 # The dual of a function.
 Derive = Callable[[Lam], Lam]
 
+Groups = tuple[tuple[Term, ...], ...]
+
+MOST_ITEMS = 64  # functions in an array that are looked at one by one
 DEEPEST = 60  # calls inside calls
 MOST_NAMES = 100  # that a definition may lead through
 
@@ -83,11 +115,87 @@ class Expansion:
             named = named.function
         if path.count(named) >= self.rounds or len(path) > DEEPEST:
             return call
+        if isinstance(head, Deriv):
+            spelled = tuple([tuple(map(self.spelled, group)) for group in groups])
+            if any(isinstance(arg, Array) and _has_functions(arg.body) for arg in chain.from_iterable(spelled)):
+                return call  # until it is known which functions there are
+            if any(map(_has_functions, chain.from_iterable(spelled))):
+                head, groups = self.in_parts(head, spelled, (*path, named))
         function = known_function(head, self.resolve, self.derive)
         if function is None:
             return call
         inner = (*path, named) if isinstance(named, Global) else path
         return self.calls.carried_out(call, function, groups, lambda body: self.run(body, inner))
+
+    def spelled(self, arg: Term) -> Term:
+        """An array of what is made of functions, element by element, where it is known which they are."""
+        if not isinstance(arg, Array) or not _has_functions(arg.body):
+            return arg
+        whole = transform(arg, lambda _, new: self.listed(new) if isinstance(new, Global) else new)
+        if not isinstance(whole, Array) or not isinstance(whole.size, Const) or whole.size.value > MOST_ITEMS:
+            return arg
+        return list_of(substitute(whole.body, {whole.variable: const(n)}) for n in range(int(whole.size.value)))
+
+    def listed(self, name: Global) -> Term:
+        found = named(name, self.resolve)
+        return found if isinstance(found, ListOf) else name
+
+    def in_parts(self, head: Deriv, groups: Groups, path: tuple[Term, ...]) -> tuple[Term, Groups]:
+        """The derivative of a function of the parts of those arguments in which there are functions, and these parts:
+        duals stand side by side in them, and a parameter that is called is seen to be a function, also where it is
+        handed on."""
+        inner = known_function(head.function, self.resolve, self.derive)
+        if inner is None:
+            return head, groups
+        params, body = uncurry(inner, sizes_of(groups))
+        args = arguments_of(inner, groups)
+        if args != tuple(chain.from_iterable(groups)) or len(args) != len(params):
+            return head, groups
+        taken, parts = {*params, *body.free}, list[tuple[str, Term]]()
+        whole = {param: _named(param, arg, taken, parts) for param, arg in zip(params, args, strict=True)}
+        names, given = zip(*parts, strict=True)
+        opened = transform(substitute(body, whole), _part_by_part)
+        functions = {name for name, arg in parts if _has_functions(arg)}
+        if _hands_on(opened, functions):
+            opened = self.run(opened, path)
+        return deriv(lam(names, opened)), (given,)
+
+
+def _has_functions(arg: Term) -> bool:
+    """Whether an argument is a function, or a tuple or an array in which there is one."""
+    if isinstance(arg, Tuple | ListOf):
+        return any(map(_has_functions, arg.items))
+    return isinstance(arg, Deriv | Lam)
+
+
+def _part_by_part(_: Term, new: Term) -> Term:
+    """A part of an element of an array of tuples as an element of an array of these parts."""
+    if isinstance(new, Proj) and isinstance(new.term, Index) and isinstance(new.term.array, ListOf):
+        return index(list_of(proj(item, new.index) for item in new.term.array.items), new.term.index)
+    return new
+
+
+def _hands_on(term: Term, functions: set[str]) -> bool:
+    """Whether one of these functions is an argument of a call, or a part of one."""
+    waiting = [arg for node in postorder(term) if isinstance(node, App) for arg in node.args]
+    while waiting:
+        arg = waiting.pop()
+        if isinstance(arg, Var) and arg.name in functions:
+            return True
+        if isinstance(arg, Tuple | ListOf):
+            waiting += arg.items
+    return False
+
+
+def _named(name: str, arg: Term, taken: set[str], parts: list[tuple[str, Term]]) -> Term:
+    """A parameter as it is put together of its parts, each of which gets a name, with its argument."""
+    if isinstance(arg, Tuple | ListOf) and _has_functions(arg):
+        items = [_named(name, item, taken, parts) for item in arg.items]
+        return tuple_(items) if isinstance(arg, Tuple) else list_of(items)
+    own = fresh(name, taken)
+    taken.add(own)
+    parts.append((own, arg))
+    return var(own)
 
 
 def known_function(head: Term, resolve: Resolve, derive: Derive | None) -> Lam | None:
@@ -100,6 +208,9 @@ def known_function(head: Term, resolve: Resolve, derive: Derive | None) -> Lam |
     if isinstance(head, Deriv) and derive is not None:
         inner = known_function(head.function, resolve, derive)
         return None if inner is None else derive(inner)
+    if isinstance(head, Proj):
+        whole = named(head.term, resolve) if isinstance(head.term, Global) else None
+        return known_function(whole.items[head.index], resolve, derive) if isinstance(whole, Tuple) else None
     return head if isinstance(head, Lam) else None
 
 
@@ -114,13 +225,19 @@ def named(name: Global, resolve: Resolve) -> Term | None:
 
 
 def heads_of(term: Term) -> frozenset[str]:
-    """The variables that are functions: those that are applied."""
+    """The variables that are functions: those that are applied, also by their place in an array."""
+    heads = [node.function for node in postorder(term) if isinstance(node, App)]
     found: set[str] = set()
-    for node in postorder(term):
-        if isinstance(node, App):
-            head = node.function
-            while isinstance(head, Deriv):
-                head = head.function
-            if isinstance(head, Var):
-                found.add(head.name)
+    while heads:
+        match heads.pop():
+            case Var(name=name):
+                found.add(name)
+            case Deriv(function=inner):
+                heads.append(inner)
+            case Index(array=ListOf(items=items)):
+                heads += items
+            case Proj(term=Index(array=ListOf(items=items)), index=number):
+                heads += [proj(item, number) for item in items if isinstance(item, Tuple)]
+            case If(then=then, orelse=orelse):
+                heads += (then, orelse)
     return frozenset(found)

@@ -11,7 +11,7 @@ from typing import Any, ParamSpec, TypeVar
 
 from potto.calculus.inlining.arrays import ARRAYS
 from potto.calculus.inlining.expand import Resolve
-from potto.core.terms import Branch, Delta, Deriv, Global, Index, Integral, Prim, Term, Var, outside, postorder
+from potto.core.terms import Branch, Delta, Deriv, Global, Index, Integral, Lam, Prim, Term, outside, postorder
 from potto.primitives import PRIMITIVES
 
 MOST_KEPT = 4096  # results of one function
@@ -46,11 +46,12 @@ class Reach:
         return found
 
     def derived(self, term: Term) -> frozenset[type]:
-        """What is reached from the functions that are derived; of one that is a parameter, it may be anything."""
+        """What is reached from the functions that are derived; of one that is a parameter, or a part of
+        one, it may be anything."""
         found = self.known_derived.get(term)
         if found is None:
             heads = {node.function for node in self._all(term) if isinstance(node, Deriv)}
-            kinds = (self.kinds(term if isinstance(head, Var) else head) for head in heads)
+            kinds = (self.kinds(head if isinstance(head, Global | Lam | Deriv) else term) for head in heads)
             found = self.known_derived[term] = frozenset[type]().union(*kinds)
         return found
 

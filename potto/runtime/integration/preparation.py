@@ -28,6 +28,7 @@ from potto.core.terms import (
     Global,
     Index,
     Integral,
+    Lam,
     Prim,
     Sum,
     Term,
@@ -197,11 +198,21 @@ def _counted(term: Integral, reach: Reach, again: bool) -> Integral:
         raise _not_found(str(problem)) from None
     variables = frozenset(term.variables)
     calls = [node for node in postorder(body) if isinstance(node, App) and node.free & variables]
-    if any(reach.deltas(call.function) for call in calls):
+    if any(reach.deltas(call.function) or _is_unknown(call.function) for call in calls):
         raise _not_found("what is differentiated is out of sight")
     before = {node for node in postorder(term.body) if isinstance(node, Delta)}
     found = any(isinstance(n, Delta) and n not in before and n.coordinates[0].free & variables for n in postorder(body))
     return with_integrand(term, body) if found or again else term
+
+
+def _is_unknown(function: Term) -> bool:
+    """Whether the derivative of something is called that is no function as it stands."""
+    head = spine(function)[0] if isinstance(function, App) else function
+    while isinstance(head, Deriv):
+        head = head.function
+        if not isinstance(head, Deriv | Global | Lam | Var):
+            return True
+    return False
 
 
 def _not_found(reason: str) -> PottoError:
