@@ -31,6 +31,15 @@ def test_every_program_is_there() -> None:
     assert {world.program for world in BESIDE["WORLDS"]} == wanted
 
 
+def test_what_others_say_is_told_of_every_program() -> None:
+    page = (EXAMPLES.parent / "docs" / "worlds.md").read_text(encoding="utf-8").partition("## What other tools say")[2]
+    rows = [row.split("|") for row in page.splitlines() if row.startswith("| `")]
+    assert all("](https://" in source for *_, source, _ in rows)
+    told = " ".join(row[1] for row in rows)
+    for world in BESIDE["WORLDS"]:
+        assert f"`{world.program}`" in told or f"`{world.program.partition('/')[2]}`" in told, world.program
+
+
 @pytest.mark.parametrize("number", WORLDS, ids=named)
 def test_values_agree_and_slopes_of_sums_lack_the_boundary(number: int) -> None:
     """What bends and does not jump, the newsvendor's cost, has the derivative of its sum. Of all others a tenth of it
