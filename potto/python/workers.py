@@ -9,6 +9,7 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
+import threading
 from collections.abc import Callable
 from concurrent.futures import Executor, Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
@@ -42,7 +43,7 @@ class Workers(Executor):
     def _open(self) -> ProcessPoolExecutor:
         if self._pool is None:
             context = multiprocessing.get_context("spawn")  # threads of ours don't survive a fork
-            self._pool = ProcessPoolExecutor(self._max_workers, context, _leave_interrupts)
+            self._pool = ProcessPoolExecutor(self._max_workers, context, _works_for_another)
         return self._pool
 
     def __exit__(self, *raised: object) -> None:
@@ -59,5 +60,13 @@ class Workers(Executor):
             pool.shutdown(wait, cancel_futures=cancel_futures)
 
 
-def _leave_interrupts() -> None:
+def _works_for_another() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with_it, daemon=True).start()
+
+
+def _end_with_it() -> None:
+    """One that is killed tells nobody: its workers would wait for tasks for ever, and whoever reads what they print."""
+    if (parent := multiprocessing.parent_process()) is not None:
+        parent.join()
+        os._exit(1)

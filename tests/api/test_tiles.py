@@ -201,6 +201,16 @@ def test_workers_are_not_waited_for_after_an_interrupt() -> None:
     assert time.perf_counter() - start < 50
 
 
+def test_workers_end_with_the_one_they_work_for() -> None:
+    """Killed, it can't tell them; what they print into stays open for as long as they live."""
+    text = (
+        "import os, signal; from potto.python.workers import Workers; pool = Workers(1);"
+        "print(pool.submit(abs, -7).result(), flush=True); os.kill(os.getpid(), signal.SIGKILL)"
+    )
+    ended = subprocess.run([sys.executable, "-c", text], stdout=subprocess.PIPE, text=True, timeout=60)
+    assert (ended.stdout, ended.returncode) == ("7\n", -signal.SIGKILL)
+
+
 def test_progress_is_told(module: Any) -> None:
     shares: list[float] = []
     gauge = Gauge()
