@@ -45,7 +45,7 @@ def pictures(folder: Path, quick: bool) -> list[dict[str, Any]]:
             channels, error = lit(getattr(module, name), side, {"q": -0.2, "ex": 0.0, "focal": 1.0, **more})
             file = f"raytrace-sparsity-{name.replace('_', '-')}.png"
             (folder / file).write_bytes(encode((channels[::-1] * np.uint8(255)).tobytes(), side, side))
-            caption = f"{name}: red by the corner, green by the light, blue by the camera"
+            caption = f"{name.replace('_', ' ')}: red corner, green light, blue camera"
             seconds = time.perf_counter() - start
             made.append({"file": file, "caption": caption, "seconds": seconds, "error": error})
     return made

@@ -342,7 +342,9 @@ def _tell(
         )
     if found.interrupted:
         done = (
-            f"{len(found.frames)} of {options.frames} frames" if options.over else f"{found.unknown:,} pixels are gray"
+            f"{len(found.frames)} of {options.frames} frames"
+            if options.over
+            else f"{found.unknown:,} pixels were not reached"
         )
         console.complain(f"interrupted: {done}")
     for reason in found.reasons:

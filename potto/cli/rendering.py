@@ -358,6 +358,7 @@ def images(
 
 
 def _image(layer: Layer, picture: Picture, grid: Grid, caption: str) -> Image:
+    from potto.applications.colours import DECADES
     from potto.applications.picture_files import pixels
     from potto.applications.pictures import Image
 
@@ -366,6 +367,8 @@ def _image(layer: Layer, picture: Picture, grid: Grid, caption: str) -> Image:
     what, by, parameter = layer.shows.partition(" by ")
     label = name if what == "value" else f"{what} of {name}{by}{parameter}"
     paint = layer.paint
+    if paint is None:
+        label += f", from black at 1e-{DECADES} to white at 1"
     rows = tuple(tuple(map(tuple, row)) for row in pixels(layer.colours(), grid).tolist())
     bare = paint is None or picture.width >= 3
     return Image(

@@ -344,7 +344,7 @@ def test_an_interrupted_picture_is_gray_where_nothing_was_done(tmp_path: Path) -
     (tmp_path / "s.po").write_text(scene)
     words = ["s.po", "slow", "r=0.9", "--wrt", "r", "--size", "4096", "--workers", "1", "-o", "e.npy"]
     status, _, err = _interrupted(tmp_path, *words)
-    gray = re.search(r"interrupted: ([\d,]+) pixels are gray", err)
+    gray = re.search(r"interrupted: ([\d,]+) pixels were not reached", err)
     assert status == 130 and "Traceback" not in err and gray is not None, err
     value = np.load(tmp_path / "e.npy")
     assert int(gray[1].replace(",", "")) == np.isnan(value).sum() and 0 < np.isnan(value).mean() < 1
