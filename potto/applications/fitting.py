@@ -23,6 +23,7 @@ from potto.kernels.errors import wrong_call
 from potto.python.functions import Function
 from potto.python.gradients import grad
 from potto.runtime.answers.estimate import Estimate
+from potto.types.types import TupleOf, Type
 
 Path = tuple[str, ...]
 """The name of a parameter and, where that is a record, those of fields."""
@@ -93,6 +94,13 @@ def numbers_of(start: Mapping[str, Any]) -> dict[str, float]:
         for path, value in _starts(start).items()
         for label, number in zip(_labels(value), np.ravel(value), strict=True)
     }
+
+
+def by_fields(value: Any, type: Type) -> Any:
+    """A record, which is a tuple as a value, as a dict of its fields."""
+    if not isinstance(type, TupleOf) or type.record is None:
+        return value
+    return {name: by_fields(v, t) for name, v, t in zip(type.record.fields, value, type.items, strict=True)}
 
 
 def _starts(start: Mapping[str, Any]) -> dict[Path, Any]:

@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from potto.applications.minimizing import Fit, Step
     from potto.evaluating.world import World
     from potto.runtime.answers.estimate import Estimate
-    from potto.types.types import Type
 
 SUMMARY = "find the parameters that make a function least, along its derivatives"
 EXAMPLE = """  potto fit lamp.po loss angle=0.2 height=1 --with shader=lin --bound angle=0:1.5
@@ -146,6 +145,7 @@ def _fitted(
 
 def _start(world: World, file: str, name: str, text: str) -> Any:
     """What a parameter starts at: numbers, records as dicts. Raises PottoError."""
+    from potto.applications.fitting import by_fields
     from potto.kernels.errors import wrong_call
 
     help = f"numbers are fitted; what stays as it is goes after --with: `--with {name}=…`"
@@ -154,16 +154,7 @@ def _start(world: World, file: str, name: str, text: str) -> Any:
     value, (_, type) = argument_in(world, file, text), world.typed(file, text)
     if callable(value):
         raise wrong_call(f"`{name}` starts at something that is not a number", help)
-    return _by_fields(value, type)
-
-
-def _by_fields(value: Any, type: Type) -> Any:
-    """A record, which is a tuple as a value, as a dict of its fields."""
-    from potto.types.types import TupleOf
-
-    if not isinstance(type, TupleOf) or type.record is None:
-        return value
-    return {name: _by_fields(v, t) for name, v, t in zip(type.record.fields, value, type.items, strict=True)}
+    return by_fields(value, type)
 
 
 class _Progress:

@@ -111,3 +111,15 @@ def test_what_holds_a_function_rests() -> None:
         SCENE.eval("grad(one, s)(scene[0], 1)")
     with pytest.raises(potto.PottoError, match="a second derivative stops at a tuple, record or array"):
         SCENE.eval(r"D(\t . D(one, t)(scene[0], t))(1)")
+
+
+@pytest.mark.parametrize("place", ["1", "1 - i"])
+def test_a_function_of_an_array_is_called_on_one_side_of_a_plain_condition(place: str) -> None:
+    """Under an integral it is found beside it, where it is needed: at t = 1/2 not, at 1/4 for t^2."""
+    module = potto.compile(rf"""
+square = \u . u*u
+def g(fs: [n] (Real* -> Real), t) sum i in 0..0 (integral [0, 1] (if [t >= 0.5] then x else fs[{place}](t)) d(x))
+def f(t) g([sin, square], t)
+""")
+    assert module.f(0.5).value == pytest.approx(0.5, rel=1e-13)
+    assert module.f(0.25).value == pytest.approx(1 / 16, rel=1e-13)

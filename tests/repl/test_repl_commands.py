@@ -101,6 +101,21 @@ def test_grad_by_every_number(talk):
     assert talk(":grad h").failed and talk(":grad 3").failed
 
 
+def test_grad_and_fit_of_what_is_made_of_numbers(talk):
+    talk.all(
+        "record P(at: (Real, Real), w: Real)", "def h(xs: [n] Real, k, p: P) p.w^2 + (sum x in xs ((x - k)^2))",
+        "def least(p: P, u: (Real, Real)) (p.w - 1)^2 + (p.at.x - 2)^2 + p.at.y^2 + u.x^2 + u.y^2",
+    )  # fmt: skip
+    found = talk.data(":grad h([1, 2, 4], 2, P((0, 0), 3))")["gradient"]
+    assert list(found) == ["value", "xs", "k", "p"] and found["value"] == 9 + 5
+    assert list(found["xs"]) == [-2, 0, 4] and found["k"] == -2 and tuple(found["p"]) == ((0, 0), 6)
+    assert "d/dp = P(at=(0, 0), w=6)" in talk(":grad h([1, 2, 4], 2, P((0, 0), 3))").text.replace("∂/∂", "d/d")
+    assert talk(":check h([1, 2, 4], 2, P((0, 0), 3))").text.count("they agree") == 1  # by `k`, the one number
+    found = talk(":fit least p=P((0, 0), 3) u=(1, 1)").parts[0].data["parameters"]
+    assert found["p"]["w"] == pytest.approx(1, rel=1e-6) and found["p"]["at"][0] == pytest.approx(2, rel=1e-6)
+    assert talk(":fit least p=sin u=(1, 1)").failed
+
+
 def test_grad_of_a_function_that_takes_a_function(talk):
     talk.all("def h(c, s) integral [0, 1] s(x)*[x < c] d(x)", "w = \\x . x")
     assert talk.data(":grad h(0.6, w)")["gradient"]["c"] == pytest.approx(0.6, rel=1e-12)

@@ -12,9 +12,11 @@ from msgspec import Struct
 from potto.calculus.inlining.arrays import ARRAYS, bound
 from potto.core.terms import (
     ZERO,
+    App,
     Branch,
     Holding,
     If,
+    Index,
     Integral,
     Proj,
     Sum,
@@ -23,6 +25,8 @@ from potto.core.terms import (
     children,
     fresh,
     if_,
+    index,
+    postorder,
     prim,
     transform,
     var,
@@ -54,13 +58,14 @@ def beside(term: Term, varying: frozenset[str]) -> tuple[Term, tuple[Access, ...
     inside, arrays = varying | frozenset(bound(term)), Holding(*ARRAYS)
     guards: dict[Term, list[tuple[Term, ...]]] = {}
     _gather(term, (), inside, arrays, guards)
+    called = {node.function for node in postorder(term) if isinstance(node, App)}
     names, taken = dict[Term, Term](), set(term.free | inside)
     accesses: list[Access] = []
     for node, ways in guards.items():
         name = fresh(_stem(node), taken)
         taken.add(name)
         names[node] = var(name)
-        accesses.append(Access(name, _guarded(node, ways)))
+        accesses.append(Access(name, _guarded(node, ways, node in called)))
     found = transform(
         term, lambda node, new: names.get(node, new), lambda node: () if node in names else children(node)
     )
@@ -98,11 +103,19 @@ def _condition(node: If | Branch, inside: frozenset[str]) -> Term | None:
     return prim("lt" if node.strict else "le", ZERO, node.surface)
 
 
-def _guarded(node: Term, ways: list[tuple[Term, ...]]) -> Term:
+def _guarded(node: Term, ways: list[tuple[Term, ...]], called: bool) -> Term:
+    """What is read where it is needed; elsewhere 0, or the first function of those that one is called of."""
     if () in ways:
         return node
     conditions = [way[0] if len(way) == 1 else prim("and", *way) for way in ways]
-    return if_(conditions[0] if len(conditions) == 1 else prim("or", *conditions), node, ZERO)
+    needed = conditions[0] if len(conditions) == 1 else prim("or", *conditions)
+    if not called:
+        return if_(needed, node, ZERO)
+
+    def guarded(_: Term, new: Term) -> Term:
+        return index(new.array, if_(needed, new.index, ZERO)) if isinstance(new, Index) else new
+
+    return transform(node, guarded)
 
 
 def _stem(node: Term) -> str:

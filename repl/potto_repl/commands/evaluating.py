@@ -34,7 +34,7 @@ from potto_repl.expressions import call_of, checked
 from potto_repl.registry import command
 from potto_repl.reply import Part, Refusal, diagnostic
 from potto_repl.session import Conversation, plain_names
-from potto_repl.slopes import slopes
+from potto_repl.slopes import all_slopes
 from potto_repl.values import is_dual, parts_of, tail, value_parts
 
 TOLERANCES = (1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12)
@@ -64,7 +64,7 @@ def gradient(session: Conversation, text: str) -> Iterator[Part]:
     lines: list[str] = []
     data: dict[str, Any] = {}
     cost = ""
-    for slope in slopes(session, called):
+    for slope in all_slopes(session, called):
         dual = slope.dual
         if not lines:
             lines.append(f"{text.strip()} = {led(with_error(dual.value, dual.error), dual.converged)}")

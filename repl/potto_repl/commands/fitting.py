@@ -11,8 +11,9 @@ from collections.abc import Iterator, Sequence
 
 from msgspec.structs import asdict
 
+from potto.applications.fitting import by_fields
 from potto.applications.fitting import fit as fitted
-from potto.applications.minimizing import Step
+from potto.applications.minimizing import MOST_TOLD, Step
 from potto.applications.pictures import course
 from potto.projects.settings import settings
 from potto.python.functions import Function
@@ -53,7 +54,7 @@ def fit(session: Conversation, text: str) -> Iterator[Part]:
     begun = time.perf_counter()
     if session.progress is not None:
         session.progress(f"fitting {name}")
-    values = {n: float(session.evaluate(v, session.settings).estimate.value) for n, v in start.items()}
+    values = {n: _start(session, n, value) for n, value in start.items()}
 
     def told(step: Step) -> None:
         if session.progress is not None and time.perf_counter() - begun > PATIENCE:
@@ -63,8 +64,9 @@ def fit(session: Conversation, text: str) -> Iterator[Part]:
     with settings(**asdict(session.settings)):
         found = fitted(function, values, given=given, progress=told)
     doubts = found.doubts()
-    best = [f"{n} = {format_number(v, doubts[n])}" for n, v in found.parameters.items()]
-    said = [f"{name} = {with_error(found.value, found.error)} at {', '.join(best)}"]
+    best = [f"{n} = {format_number(v, doubts[n])}" for n, v in list(found.numbers.items())[:MOST_TOLD]]
+    more = f", … {len(found.numbers) - MOST_TOLD:,} more" if len(found.numbers) > MOST_TOLD else ""
+    said = [f"{name} = {with_error(found.value, found.error)} at {', '.join(best)}{more}"]
     said.append(f"  slope {format_error(found.slope)}{'' if found.converged else ': ' + found.reason}")
     data = {"fit": name, "value": found.value, "parameters": found.parameters, "slope": found.slope,
             "steps": len(found.steps) - 1, "converged": found.converged}  # fmt: skip
@@ -98,11 +100,19 @@ def _read(text: str) -> tuple[str, dict[str, str], dict[str, str]]:
 
 
 def _assignments(text: str) -> dict[str, str]:
-    spaced = re.sub(r"(?<=[\w)])\s+(?=[^\W\d]\w*\s*=[^=])", ", ", text)
+    spaced = re.sub(r"(?<=[\w)\]])\s+(?=[^\W\d]\w*\s*=[^=])", ", ", text)
     pairs = [item.partition("=") for item in split_items(spaced)]
     if not all(name.strip().isidentifier() and value.strip() for name, _, value in pairs):
         raise Refusal(f"`{text.strip()}` does not say which parameter is what", "write `t=0.5, c=1`")
     return {name.strip(): value.strip() for name, _, value in pairs}
+
+
+def _start(session: Conversation, name: str, text: str) -> object:
+    """What a parameter starts at: a number, or what is made of numbers."""
+    asked = checked(session, text, ":fit loss t=0.5")
+    if asked.groups:
+        raise Refusal(f"`{name}` starts at a function, and numbers are fitted", f"let it stay, `with {name}={text}`")
+    return by_fields(session.evaluate(asked.text, session.settings).estimate.value, asked.type)
 
 
 def _fixed(session: Conversation, text: str) -> object:
