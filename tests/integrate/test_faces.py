@@ -103,3 +103,18 @@ def test_a_face_along_an_infinite_range(x: str, condition: str) -> None:
         answer = potto.deriv(potto.compile(program).f)((0.5, 1.0))
     assert abs(answer.value - 0.5) <= answer.error <= 1e-10
     assert abs(answer.tangent + 1) <= answer.tangent_error <= 1e-10
+
+
+@pytest.mark.parametrize("bounds", ["[-inf, inf]", "[-6, 6]"])
+@pytest.mark.parametrize("condition", ["[{}]", "[y < 0]*[({}) or y*exp(-x^2) > t]"])
+def test_a_surface_that_falls_into_faces_beside_its_kink(bounds: str, condition: str) -> None:
+    """|y| t >= y x is x <= t where y > 0 and x >= -t where y < 0, each for all y, on a range that has no ends to tell.
+    With y t <= y x that leaves -t <= x <= t for y < 0: sqrt(pi) erf(t) Phi(-2 t)."""
+    both = condition.format("abs(y)*t >= y*x and y*t <= y*x")
+    text = f"def f(t) integral {bounds} (integral (y ~ normal(t, 0.5)) {both}*exp(-x^2) d(y)) d(x)"
+    t, tail = 0.7, math.erfc(0.7 * math.sqrt(2)) / 2
+    exact = math.sqrt(math.pi) * math.erf(t) * tail
+    slope = 2 * math.exp(-t * t) * tail - math.sqrt(2) * math.erf(t) * math.exp(-2 * t * t)
+    answer = potto.deriv(potto.compile(text).f)((t, 1.0))
+    assert abs(answer.value - exact) <= answer.error + 1e-16 and answer.error <= 1e-10
+    assert abs(answer.tangent - slope) <= answer.tangent_error + 1e-16 and answer.tangent_error <= 1e-10

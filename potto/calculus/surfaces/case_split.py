@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from potto.calculus.algebra.ranges import positive
+from potto.calculus.solving.solve import shared_factors
 from potto.calculus.surfaces.nested_brackets import has_nested
 from potto.core.terms import (
     Branch,
@@ -166,9 +167,17 @@ def _direction(surface: Term, part: Term) -> int:
 
 
 def _changes(node: Branch) -> bool:
-    """Whether one of the cases of a condition varies with less than the condition, or not at all."""
-    parts = [part for part in _outside(node.surface) if isinstance(part, Prim) and part.op in _FLAT]
-    return any(arg.free != part.free for part in parts if part.free for arg in part.args)
+    """Whether one of the cases of a condition varies with less than the condition, or not at all, or a factor of one
+    does: |y|*t - y*x is y*(t - x) where y > 0, which has another place in x than where it is not."""
+    parts = [part for part in _outside(node.surface) if isinstance(part, Prim) and PRIMITIVES[part.op].cases]
+    flat = [part for part in parts if part.op in _FLAT and part.free]
+    return any(arg.free != part.free for part in flat for arg in part.args) or any(
+        factor.free and factor.free != case.free
+        for part in parts
+        for value in PRIMITIVES[part.op].cases(*part.args)[1:]  # type: ignore[misc]
+        if isinstance(case := replaced(node.surface, {part: value}), Prim) and case.op == "add"
+        for factor in shared_factors(case)
+    )
 
 
 def _apart(node: Term, most: int) -> Term:

@@ -78,6 +78,8 @@ def frame_rows(plan: LevelPlan, values: tuple[Value, ...]) -> tuple[Cell, Cell, 
         for cell, (cut, turning) in zip(cells[2:], plan.rows, strict=True)
     ]
     for row in rows:
+        if row.cut < 0:  # nothing bends at these: it is all the same how far off they are
+            row.e = None
         if row.cut == RESTING:
             row.t = row.et = ()
     return cells[0], cells[1], rows
@@ -176,13 +178,12 @@ def on_bounds(
     derivatives to one side, where it is known on which side of the bound they are. kin: as `segments` takes it."""
     ends = _ends(lo, hi, batch, directions)[:2]
     roots, off, t = _stacked(rows, batch, directions)
-    reach = ends[1][0] - ends[0][0]
     found = []
     for number, row in enumerate(rows):
         x = roots[number]
-        size = np.where(np.isfinite(reach), reach, 1 + np.abs(x))  # of an infinite range no part tells anything
+        most = _one_place(ends[0][0], ends[1][0], x)
         for bound, speed, e in ends if row.cut >= 0 and plan.level.cuts[row.cut].decides else ():
-            near = np.clip(off[number] + e, NARROW * np.abs(bound), ONE_PLACE * size)
+            near = np.clip(off[number] + e, NARROW * np.abs(bound), most)
             near = (np.abs(x - bound) <= near) & (x != bound) & np.isfinite(bound)
             near &= (t[:directions, number + 1] != speed).any(axis=0)
             if near.any():
@@ -192,6 +193,12 @@ def on_bounds(
                 x[owner] = bound[owner]
         found.append(row if x is roots[number] else replace(row, x=x))
     return found
+
+
+def _one_place(low: Array, high: Array, x: Array) -> Array:
+    """How far from x at the most another place is the same but for rounding; of an infinite range no part tells that."""
+    reach = high - low
+    return ONE_PLACE * np.where(np.isfinite(reach), reach, 1 + np.abs(x))
 
 
 def standing(cuts: Cuts) -> Cuts:
@@ -229,7 +236,7 @@ def _edges(
     found: list[tuple[int, Edge]] = []
     for upper, (bound, tb, e) in enumerate(ends):
         with np.errstate(invalid="ignore"):
-            near = np.where(decides[:, None], 0.0, np.minimum(off + e, ONE_PLACE * (high - low)))
+            near = np.where(decides[:, None], 0.0, np.minimum(off + e, _one_place(low, high, roots)))
             on = (roots == bound) | (np.abs(roots - bound) <= near)
         for i in np.nonzero(on.any(axis=1))[0].tolist():
             if rows[i].cut < 0:
@@ -252,7 +259,8 @@ def _sorted(
     # the bounds stay first and last even among equals: candidates were clipped to the upper bound
     member = np.arange(x.shape[1])
     x, e, inside = x[order, member], e[order, member], inside[order, member]
-    close = (x[1:] - x[:-1] <= np.minimum(e[1:] + e[:-1], ONE_PLACE * (x[-1] - x[0]))) & inside[1:] & inside[:-1]
+    most = np.minimum(e[1:] + e[:-1], _one_place(x[0], x[-1], x[1:]))  # roots that merge may be off by anything
+    close = (x[1:] - x[:-1] <= most) & inside[1:] & inside[:-1]
     if close.any():  # to rounding they are at one place
         for i in np.nonzero(close.any(axis=1))[0]:
             x[i + 1] = np.where(close[i], x[i], x[i + 1])

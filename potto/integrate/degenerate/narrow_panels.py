@@ -41,7 +41,8 @@ def count_narrow(
         owner = seg.owner[part]
         apart = _difference(scene, seg, sides, groups, part) if len(groups) <= MOST_SURFACES else np.full(1, np.inf)
         for c, rows in enumerate(np.broadcast_to(apart, (sums.v.shape[0], part.size))):
-            np.add.at(sums.e[c], owner, rows * (seg.b - seg.a)[part])
+            length = np.where(rows > 0, (seg.b - seg.a)[part], 0.0)  # that of an infinite range may be as well
+            np.add.at(sums.e[c], owner, rows * length)
             for d, spreads in enumerate(np.abs(seg.tb - seg.ta)[:, part]):
                 np.add.at(sums.et[c, d], owner, np.where(spreads > 0, rows * spreads, 0.0))
         if not scene.machine.side and len(groups) == 1:
