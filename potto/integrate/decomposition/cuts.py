@@ -196,7 +196,7 @@ def on_bounds(
 
 
 def _one_place(low: Array, high: Array, x: Array) -> Array:
-    """How far from x another place at the most is the same but for rounding: of an infinite range no part tells that."""
+    """How far from x another place is at the most the same but for rounding. Of infinite ranges no part tells that."""
     reach = high - low
     return ONE_PLACE * np.where(np.isfinite(reach), reach, 1 + np.abs(x))
 
