@@ -226,7 +226,7 @@ class _Filling:
         record = _record_of(self.parameters, resolve(self.made))
         if record is not None:
             span = argument.name_span or argument.span
-            return no_field(self.inference.outside, span, argument.name or "", record, f"of `{record.name}`")
+            return no_field(self.inference.outside, span, argument.name or "", record)
         near = near_names(argument.name or "", names)
         return kinds.UNKNOWN_KEYWORD(
             argument.name_span or argument.span,

@@ -222,7 +222,7 @@ def shadowing(local: Local, before: Local) -> Diagnostic:
     )
 
 
-def no_field(outside: Outside, span: Span, name: str, record: RecordName, label: str) -> Diagnostic:
+def no_field(outside: Outside, span: Span, name: str, record: RecordName) -> Diagnostic:
     """What is said of a field that a record doesn't have."""
     item = definition(outside.db, record.file, record.name) if "." not in record.name else None  # else it is data
     related = _header(outside, record, name)
@@ -230,16 +230,20 @@ def no_field(outside: Outside, span: Span, name: str, record: RecordName, label:
         related = (Related(item.name_span, f"`{record.name}` is defined here", record.file, record.name),)
     near = near_names(name, record.fields)
     help = did_you_mean(near) or "it has " + ", ".join(f"`{name}`" for name in record.fields)
-    message = f"a record `{record.name}` has no field `{name}`"
+    label = f"no field `{name}`"
+    message = f"a record `{record.name}` has {label}"
     if record.name.endswith(_TABLES):
-        message = f"`{record.name}` has no column `{name}`"
+        label = f"no column `{name}`"
+        message = f"`{record.name}` has {label}"
         if name in record.texts:
+            label = "holds text"
             message = f"the column `{name}` of `{record.name}` holds text, which programs cannot use"
             help = (
                 "only columns of numbers are loaded; write a number for each text, such as 0 and 1, in another column"
             )
     elif "." in record.name:  # another file of data
-        message = f"`{record.name}` holds no `{name}`"
+        label = f"holds no `{name}`"
+        message = f"`{record.name}` {label}"
     return kinds.UNKNOWN_FIELD(span, message, label=label, related=related, help=help, suggestions=instead(span, near))
 
 

@@ -100,7 +100,7 @@ def _with(inference: Inference, node: nodes.With) -> Type:
             continue
         if argument.name not in record.fields:
             name, span = argument.name or "", argument.name_span or argument.span
-            inference.report(no_field(inference.outside, span, name, record, f"of `{record.name}`"))
+            inference.report(no_field(inference.outside, span, name, record))
             continue
         place = record.fields.index(argument.name)
         inference.expect(given, found.items[place], argument.value, f"the field `{argument.name}`")

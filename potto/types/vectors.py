@@ -139,7 +139,7 @@ def place_of(name: str) -> int | None:
 def _no_part(inference: Inference, found: Type, name: str, span: Span, place: int | None) -> Diagnostic:
     help, label, suggestions = "", f"of `{format_type(found)}`", tuple[Suggestion, ...]()
     if isinstance(found, TupleOf) and found.record is not None:
-        return no_field(inference.outside, span, name, found.record, label)
+        return no_field(inference.outside, span, name, found.record)
     if isinstance(found, Meta):
         help = "say in the head what it is: `(u: (Real, Real))`"
         message = f"it is not known what `.{name}` is a part of"
