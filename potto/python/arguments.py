@@ -295,7 +295,23 @@ def misfit(name: str, argument: Any, type: Type, own: Type | None) -> str | None
     if isinstance(type, Real) and own is None and isinstance(argument, float | int):
         return None
     complaint = _complaint(name, argument, type, own)
-    return None if complaint is None else f"`{name}` is {format_type(type)}: {complaint}"
+    if complaint is None:
+        return _misfit_inside(name, argument, type)
+    return f"`{name}` is {format_type(type)}: {complaint}"
+
+
+def _misfit_inside(name: str, argument: Any, type: Type) -> str | None:
+    """Why a part of a tuple, or of a record, cannot have its type; of an array, one of its elements."""
+    parts: Iterable[tuple[str, Any, Type]] = ()
+    if isinstance(type, TupleOf) and not type.dual and isinstance(argument, tuple):
+        names = map(str, range(len(type.items))) if type.record is None else type.record.fields
+        parts = ((f"{name}.{own}", part, item) for own, part, item in zip(names, argument, type.items, strict=True))
+    elif isinstance(type, ArrayOf) and isinstance(argument, list):
+        parts = (
+            (f"{name}[{place}]", part, type.item) for place, part in enumerate(argument) if part.__class__ is not float
+        )
+    found = (misfit(own, part, t, None) for own, part, t in parts if not isinstance(resolve(t), Function | Diffeo))
+    return next((why for why in found if why is not None), None)
 
 
 def _complaint(name: str, argument: Any, type: Type, own: Type | None) -> str | None:

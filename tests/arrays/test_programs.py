@@ -266,3 +266,24 @@ def corner(t) [[[t, 1], [2, 3]], [[4, 5], [6, 7]]]
         assert slopes == pytest.approx(np.full(count, 34.0), rel=1e-15)
         assert module.corner(t).value[:, 0, 0, 0].tolist() == t.tolist()
         assert module.corner(t).value[:, 1].tolist() == [[[4, 5], [6, 7]]] * count
+
+
+@pytest.mark.parametrize(
+    ("given", "says"),
+    [
+        ({"eye": (0, 0), "focal": 3}, "`c.eye` is (Real*, Real*, Real*): a tuple of 3 is needed, not a tuple of 2"),
+        ({"eye": (0, 0, 0, 0), "focal": 3}, "`c.eye` is (Real*, Real*, Real*): a tuple of 3 is needed"),
+        ({"eye": (0, 0, 0), "focal": (1, 2)}, "`c.focal` is Real*: a number is needed, not a tuple of 2"),
+        ((0, 0, 0), "`c` is Cam: a tuple of 2 is needed, not a tuple of 3"),
+    ],
+)
+def test_what_a_part_of_a_record_is_given_is_told_with_its_place(given: object, says: str) -> None:
+    module = potto.compile("""
+record Cam(eye: (Real, Real, Real), focal: Real)
+def f(c: Cam) c.focal*c.eye.z
+def g(cs: [n] Cam) sum c in cs (c.focal*c.eye.z)
+""")
+    for call, said in ((lambda: module.f(given), says), (lambda: module.g([given]), says.replace("`c", "`cs[0]", 1))):
+        with pytest.raises(potto.PottoError) as raised:
+            call()
+        assert said in raised.value.diagnostics[0].message
