@@ -15,7 +15,6 @@ if TYPE_CHECKING:
 
 SUMMARY = "say what is wrong with programs, where, and what to do"
 EXAMPLE = "  potto check examples/ --watch"
-PAUSE = 0.2  # seconds between two looks at the files
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -77,8 +76,13 @@ def gather(world: Library, paths: list[str]) -> tuple[list[Located], int]:
 
 def _wait(world: Library, paths: list[str]) -> None:
     """Come back when a file has changed, appeared or gone."""
-    from potto.cli.files import expand
+    from potto.cli.files import expand, wait
 
-    before = expand(paths)[0]
-    while not world.refresh() and expand(paths)[0] == before:
-        time.sleep(PAUSE)
+    files = expand(paths)[0]
+
+    def changed() -> bool:
+        nonlocal files
+        before, files = files, expand(paths)[0]
+        return world.refresh() or files != before
+
+    wait(changed)

@@ -1,10 +1,11 @@
-"""From the paths of a command line to files, and to diagnostics for those that are none."""
+"""From the paths of a command line to files, and to diagnostics for those that are none; waiting for them to change."""
 
 from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Iterator, Sequence
+import time
+from collections.abc import Callable, Iterator, Sequence
 
 from potto.checking.library import NO_PROGRAMS
 from potto.modules.folders import HEAVY, is_translation
@@ -15,6 +16,16 @@ from potto.source import Span
 
 STDIN = "<stdin>"
 MAIN = "main.po"
+PAUSE, SETTLED = 0.2, 0.05  # seconds between two looks at files; for how long nothing changes once one is written
+
+
+def wait(changed: Callable[[], bool]) -> None:
+    """Come back when something has changed, and is written: who saves a file may leave it empty for a moment."""
+    while not changed():
+        time.sleep(PAUSE)
+    time.sleep(SETTLED)
+    while changed():
+        time.sleep(SETTLED)
 
 
 def expand(paths: Sequence[str]) -> tuple[list[str], list[Located]]:

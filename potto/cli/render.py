@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import math
 import time
+from collections.abc import Callable
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
@@ -25,7 +26,6 @@ MOST_PIXELS = 1 << 26
 MOST_FRAMES, MOST_IN_FRAMES = 10_000, 1 << 27  # all of them are in memory at once
 FRAMES = 60  # if nobody says
 SIDE = 256  # pixels, if nobody says
-PAUSE = 0.2  # seconds between two looks at the files
 MAPS, DIVERGING = ("gray", "viridis", "magma"), ("red-blue", "brick-navy", "purple-orange")
 TONES = ("linear", "srgb", "log")
 
@@ -170,6 +170,8 @@ def prepare(arguments: list[str]) -> list[str]:
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
+    from potto.cli.files import wait
+
     settings = settings_of(options, console)
     if settings is None:
         return 2
@@ -181,14 +183,12 @@ def run(options: argparse.Namespace, console: Console) -> int:
         return 2
     options.frames = options.frames or FRAMES
     while True:
-        watched = _watched(options) if options.watch else None  # before: what changes meanwhile is drawn next
+        changed = _changes(options) if options.watch else None  # before: what changes meanwhile is drawn next
         status = _once(options, target, settings, console)
-        if not options.watch or status == 130:
+        if changed is None or status == 130:
             return status
         console.out.flush()
-        while watched is None or not watched.refresh():
-            time.sleep(PAUSE)
-            watched = watched or _watched(options)
+        wait(changed)
         console.complain(f"-- {time.strftime('%H:%M:%S')}")
 
 
@@ -245,6 +245,20 @@ def grid_of(options: argparse.Namespace) -> Grid:
     from potto.applications.images import Grid
 
     return Grid(*_shape(options), options.box)
+
+
+def _changes(options: argparse.Namespace) -> Callable[[], bool]:
+    """What says whether something has changed since it was asked before; that the program is there now counts."""
+    watched = _watched(options)
+
+    def changed() -> bool:
+        nonlocal watched
+        if watched is None:
+            watched = _watched(options)
+            return watched is not None
+        return watched.refresh()
+
+    return changed
 
 
 def _watched(options: argparse.Namespace) -> World | None:

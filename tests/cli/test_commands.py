@@ -399,15 +399,18 @@ def test_an_interrupt_ends_with_130(potto: Potto, monkeypatch: pytest.MonkeyPatc
 
 
 def test_watch_looks_again_when_a_file_changes(potto: Potto, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    looks = iter([HALF + "g = 1\n"])
+    # The second comes while it is waited for the first to be written.
+    looks = iter([HALF + "g = 1\n", HALF + "g = 2\n", None])
 
     def edit(pause: float) -> None:
         try:
-            (tmp_path / "main.po").write_text(next(looks))
+            text = next(looks)
         except StopIteration:
             raise KeyboardInterrupt from None
+        if text is not None:
+            (tmp_path / "main.po").write_text(text)
 
-    monkeypatch.setattr("potto.cli.check.time.sleep", edit)
+    monkeypatch.setattr("potto.cli.files.time.sleep", edit)
     ran = potto("check", "--watch", "main.po", main=WRONG)
     assert ran.status == 130
     assert ran.out.count("P0301") == 1 and "1 error" in ran.err and "no problems" in ran.err
