@@ -122,6 +122,15 @@ def test_the_tilted_triangle(kind: str, wrt: str, at: tuple[float, float]) -> No
     agrees(found(MAIN, kind, wrt, given[wrt], at, **others), exact, 1e-8)
 
 
+def test_a_corner_on_the_border_of_a_pixel_is_no_kink() -> None:
+    """To rounding it is beside the border; what lies between is nothing, whose sides are not worth a look."""
+    at, others = (0.375 - H / 2, -0.046), {"ex": 0.0, "focal": 1.0}
+    exact = slope(lambda t: tilted("by_depth", *at, GIVEN | {"q": t}), -0.2)
+    agrees(found(MAIN, "by_depth", "q", -0.2, at, **others), exact, 1e-8)
+    duals = {"dq": (-0.2, 1.0), "dex": (0.0, 0.0), "dfocal": (1.0, 0.0)}
+    assert potto.deriv(MAIN.by_depth)(*at, **duals).evals < 700  # three times as many for three integrals
+
+
 @pytest.mark.parametrize("kind", ["two_tones", "by_law"])
 def test_the_line_between_the_tones_is_met(kind: str) -> None:
     """The pixels above are not all of one tone: the light and the threshold move something there."""

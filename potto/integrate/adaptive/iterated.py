@@ -94,7 +94,7 @@ class Iteration(Struct):
         seg = cuts.segments
         if self.extent is not None:
             self.extent.saw_range(number, seg, batch, root)
-        scene = Scene(self, number, level, env, sides, machine, batch, root)
+        scene = Scene(self, number, level, env, sides, machine, batch, root, slack)
         settled = self.sides_of(scene, seg)
         keep, lost = self.kept(scene, seg, settled)
         if machine.costs is not None and number + 1 == len(self.plan.levels):

@@ -44,7 +44,9 @@ NEARER, RESTS, FALLS = (2.0**-30, 2.0**-40, 2.0**-50), 1e-7, 0.9
 
 
 class Scene(Struct, frozen=True):
-    """One variable of an iteration as it is being integrated: everything that is needed to evaluate its integrand."""
+    """One variable of an iteration as it is being integrated: everything that is needed to evaluate its integrand.
+
+    slack: as `Iteration.run` takes it."""
 
     parent: Iterated
     number: int
@@ -54,6 +56,7 @@ class Scene(Struct, frozen=True):
     machine: Evaluator
     batch: int = 1
     root: Ints | None = None
+    slack: Array | None = None
 
     def below(self, owner: Ints) -> Ints | None:
         """The members of the outermost batch that some of this one belong to; None if there is but one."""
@@ -174,6 +177,10 @@ def count_places(scene: Scene, cuts: Cuts, sums: Sums) -> None:
             continue
         sums.t[:, :, owner] = base + (forward if counts else np.where(differ, 0.0, forward))
         two = differ.any(axis=(0, 1))
+        if counts and scene.slack is not None:  # in a stretch that is rounding it is known well enough what it may add
+            nothing = np.isinf(scene.slack[owner])
+            sums.et[:, :, owner] += np.where(nothing, np.abs(forward - backward), 0.0)
+            two &= ~nothing
         if two.any():
             machine.note(named, scene.below(owner[two]))
 

@@ -12,6 +12,7 @@ import numpy as np
 from msgspec import Struct
 
 from potto.integrate.columns import distinct
+from potto.integrate.decomposition.cuts import NARROW, ONE_PLACE
 from potto.integrate.events import BUDGET_SPENT, TwoSided
 from potto.integrate.levels import LevelPlan
 from potto.integrate.panels.iterated import Iterated
@@ -21,7 +22,7 @@ from potto.integrate.pieces import Crossing, Ends, Evaluator, Pieces, Sums, all_
 from potto.integrate.rules import substitution
 from potto.integrate.rules.gauss import EPS, Rule, gauss, truncation
 from potto.integrate.rules.substitution import Segments
-from potto.kernels.cells import Array, Cell, Ints, Mask, Number, Value, pad
+from potto.kernels.cells import Array, Bools, Cell, Ints, Mask, Number, Value, pad
 
 CHUNK = 1 << 15  # points per kernel call: a few buffers of this length fit the second-level cache
 MOST_SLACK = 1e6  # how many times the error of a node may be larger that hardly counts
@@ -215,20 +216,29 @@ class PanelBatch(Struct, dict=True):
         env[name] = Cell(x.reshape(-1), None, tangent)
         masks = {g: m[index[flat]] if isinstance(m, np.ndarray) else m for g, m in self.sides.items()}
         root = self.below(owner[flat])
-        less = self.spared(owner, n, None if weight is None else np.broadcast_to(np.abs(weight), x.shape))
+        less = self.spared(index, n, None if weight is None else np.broadcast_to(np.abs(weight), x.shape))
         sums = self.parent.run(self.number + 1, env, x.size, masks, self.inner, root, less).widened(self.width)
         if sums.gross is not None:
             self.count_cancelling(sums, sums.gross, owner[flat])
         numbers, errors = (part.reshape(*part.shape[:2], *x.shape) for part in sums.channels())
         return numbers, errors, None if sums.common is None else sums.common.reshape(sums.v.shape[0], -1, *x.shape)
 
-    def spared(self, owner: Ints, n: int, weight: Array | None) -> Array | None:
-        """How many times the error of integrals further in may be larger at n nodes each of members that have less
-        weight than others, and by itself less than the mean."""
+    def of_rounding(self) -> Bools:
+        """The segments that rounding leaves between two places that are one, beside others of which that is no part."""
+        seg, size = self.seg, self.seg.b - self.seg.a
+        few: Bools = size < NARROW * np.maximum(np.abs(seg.a), np.abs(seg.b))
+        return few & (size < ONE_PLACE * np.bincount(seg.owner, size)[seg.owner]) if few.any() else few
+
+    def spared(self, index: Ints, n: int, weight: Array | None) -> Array | None:
+        """How many times the error of integrals further in may be larger at n nodes each of segments whose members have
+        less weight than others, and by itself less than the mean; without end where a segment is but rounding."""
+        seg, owner = self.seg, self.seg.owner[index]
         own = None if self.slack is None else np.repeat(self.slack[owner], n)
+        if (nothing := self.of_rounding()[index]).any():
+            own = np.where(np.repeat(nothing, n), np.inf, 1.0 if own is None else own)
         if weight is None or self.filled is None:
             return own
-        seg, nodes = self.seg, np.bincount(owner, minlength=self.batch) * n
+        nodes = np.bincount(owner, minlength=self.batch) * n
         reach = self.filled * np.bincount(seg.owner, seg.b - seg.a, minlength=self.batch)
         mean = (np.where(np.isfinite(reach), reach, 0.0) / np.maximum(nodes, 1))[owner]  # far out what counts is small
         with np.errstate(divide="ignore", invalid="ignore"):
