@@ -174,8 +174,11 @@ class _Search(Struct):
         there = low < high
         rows = {self.names[0]: (low, high)}
         for i in reversed(range(1, len(self.names))):  # the outermost of those within comes last in them
-            (a, b), (c, d) = enclosure(tuple(self.ends[2 * i - 2 : 2 * i]), box)
-            ends = (as_array(np.fmin(a, c), low.size), as_array(np.fmax(b, d), low.size))
+            both = enclosure(tuple(self.ends[2 * i - 2 : 2 * i]), box)
+            # an infinite bound has no enclosure, as nothing has that is infinite all over
+            least, most = ([np.where(np.isnan(end), far, end) for end in side]
+                           for side, far in zip(zip(*both, strict=True), (-np.inf, np.inf), strict=True))  # fmt: skip
+            ends = np.broadcast_to(np.minimum(*least), low.shape), np.broadcast_to(np.maximum(*most), low.shape)
             box[self.names[i]] = rows[self.names[i]] = ends
             there = there & (ends[0] < ends[1])
         owner = np.nonzero(there)[0]
