@@ -190,10 +190,12 @@ def test_where_sections_end_on_a_range_without_ends() -> None:
 
     def inside(x: Any) -> Any:
         top = mp.sqrt(t * t - x * x)
-        found = mp.polyroots([1, 0, -c * x, x**3], extraprec=20)
-        roots = sorted(mp.re(root) for root in found if abs(mp.im(root)) < 1e-12)
-        below = mp.ncdf(roots[0]) - mp.ncdf(-top) if roots[0] > -top else 0
-        return below + (mp.ncdf(min(roots[2], top)) - mp.ncdf(roots[1]) if len(roots) == 3 else 0)
+        half = mp.sqrt(c * x / 3)
+        q = x**3 / (2 * half**3) if x else mp.mpf(0)  # at most 1 up to `last`: three roots by Viète's formula, else one
+        if q > 1:
+            return mp.ncdf(max(-2 * half * mp.cosh(mp.acosh(q) / 3), -top)) - mp.ncdf(-top)
+        lowest, middle, highest = sorted(2 * half * mp.cos((mp.acos(-q) - 2 * mp.pi * k) / 3) for k in range(3))
+        return mp.ncdf(lowest) - mp.ncdf(-top) + mp.ncdf(min(highest, top)) - mp.ncdf(middle)
 
     outside = mp.findroot(lambda x: x**3 - (t * t - x * x) ** 1.5 + c * x * mp.sqrt(t * t - x * x), 0.43)
     plain = [0, last / 4, last * 3 / 4], [last, outside]
