@@ -166,7 +166,7 @@ def _evident(inference: Inference, expr: nodes.Expr) -> bool:
             meaning = _meaning(inference, expr)
             if isinstance(meaning, Local):
                 return id(meaning) in inference.heads or _is_bound(inference, meaning)
-            return isinstance(meaning, Global)
+            return isinstance(meaning, Global | Builtin)
         case nodes.Member():
             owner = inference.owners.get(id(expr), _meaning(inference, expr))
             return isinstance(owner, Global) or (isinstance(owner, Local) and id(owner) in inference.heads)

@@ -54,3 +54,14 @@ def test_a_delta_whose_place_is_chosen_has_the_roots_of_each_choice(place: str) 
     m = potto.compile(f"def f(t) integral [0, 1] (sum i in 0..1 (delta(x*t*{place} - 0.5)*{place}*x)) d(x)")
     got = potto.grad(m.f)(2.0)
     assert abs(got.value - 3 / 16) <= 1e-15 and abs(got.tangent - (-3 / 32 - 1 / 16)) <= 1e-15
+
+
+def test_a_parameter_stands_for_a_dual_where_deltas_count() -> None:
+    """d/dt of [y > 0.3] s at y = x t: s/t^2 times 0.3, from the delta at x = 0.3/t."""
+    m = potto.compile("""
+def step(y, s) [y > 0.3]*s
+def f(t, s) integral [0, 1] snd(deriv(step)((x*t, x), s)) d(x)
+def handed(t, s) let r = s in integral [0, 1] snd(deriv(step)((x*t, x), r)) d(x)
+""")
+    for function in (m.f, m.handed):
+        assert abs(function(0.8, 0.5).value - 0.3 * 0.5 / 0.64) <= 1e-15

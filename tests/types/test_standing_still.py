@@ -79,6 +79,7 @@ scene = [P(1, step), P(2, step)]
         ("deriv(g)((3, square), (2, 1))", 10, 7),
         ("deriv(g)(((3, 1), deriv(square)), (2, 1))", 10, 9),
         ("deriv(two)([square, square], (2, 1))", 12, 16),
+        ("deriv(two)([sqrt, square], (4, 1))", 66, 48.25),
         ("deriv(all)([P(1, square), P(2, square)], (2, 1))", 20, 20),
         ("deriv(all)([((1, 1), deriv(square)), ((2, 0), deriv(square))], (2, 1))", 20, 28),
     ],

@@ -21,6 +21,7 @@ from potto.calculus.surfaces.lifted import closed_value, lifted
 from potto.calculus.surfaces.nested_brackets import nested
 from potto.calculus.surfaces.trace import spine
 from potto.core.terms import (
+    ZERO,
     App,
     Branch,
     Delta,
@@ -34,18 +35,21 @@ from potto.core.terms import (
     Term,
     Var,
     add,
+    app,
     children,
     deriv,
     postorder,
     rebuild,
     substitute,
     sum_,
+    transform,
+    tuple_,
     var,
     with_integrand,
 )
 from potto.diagnostics import PottoError, declare
 from potto.kernels import errors
-from potto.kernels.cells import Value
+from potto.kernels.cells import Cell, Value
 from potto.runtime.evaluation.functions import Closure, Derivative
 from potto.runtime.evaluation.reach import Reach, kept
 from potto.runtime.integration.arrays import holds
@@ -150,7 +154,25 @@ def filled(term: Integral, env: dict[str, Value], reach: Reach) -> tuple[Integra
         env = {**env, **joined}
         given |= {new: value for new, value in joined.items() if isinstance(value, Closure)}
         derived = _derived_parameters(term)
+    if Deriv in reach.kinds(term):
+        term = _with_tangents(term, frozenset(name for name in term.free if isinstance(env[name], Cell)))
     return term, env
+
+
+@lru_cache(maxsize=4096)
+def _with_tangents(term: Integral, numbers: frozenset[str]) -> Integral:
+    """The integral, with tangents that are 0 where a number that it is given stands for a dual."""
+
+    def change(_: Term, new: Term) -> Term:
+        head = spine(new)[0] if isinstance(new, App) else None
+        if not isinstance(new, App) or not isinstance(head, Deriv) or isinstance(head.function, Deriv):
+            return new
+        args = (tuple_((arg, ZERO)) if isinstance(arg, Var) and arg.name in numbers else arg for arg in new.args)
+        return app(new.function, tuple(args))
+
+    found = transform(term, change)
+    assert isinstance(found, Integral)
+    return found
 
 
 @lru_cache(maxsize=4096)
