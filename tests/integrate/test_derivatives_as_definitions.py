@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 import potto
@@ -65,3 +66,17 @@ def handed(t, s) let r = s in integral [0, 1] snd(deriv(step)((x*t, x), r)) d(x)
 """)
     for function in (m.f, m.handed):
         assert abs(function(0.8, 0.5).value - 0.3 * 0.5 / 0.64) <= 1e-15
+
+
+@pytest.mark.parametrize("given", ["[1, s]", "named", "local", "[s for i in 0..1]", "([1, s], [0, 0])", "xs"])
+def test_an_array_stands_for_a_dual_where_deltas_count(given: str) -> None:
+    """d/dt of [y > 0.3] xs[1] + y at y = x t: the delta as above, and the integral of x."""
+    m = potto.compile(f"""
+def step(xs: [n] Real, y) [y > 0.3]*xs[1] + y
+named = [1, 0.5]
+def f(t, s, xs: [n] Real)
+    local = [1, s]
+    integral [0, 1] snd(deriv(step)({given}, (x*t, x))) d(x)
+""")
+    got = m.f(0.8, 0.5, np.array([1, 0.5]))
+    assert abs(got.value - 0.3 * 0.5 / 0.64 - 0.5) <= 1e-14  # some roundings of what is added up

@@ -15,7 +15,7 @@ from potto.calculus.differentiation.deltas import without_deltas
 from potto.calculus.differentiation.derivative import NotSmooth, total, zero_like
 from potto.calculus.differentiation.dual import Differentiator
 from potto.calculus.differentiation.level_sets import level_set, placed_along, spread
-from potto.calculus.inlining.expand import expanded
+from potto.calculus.inlining.expand import expanded, named
 from potto.calculus.solving.pivots import NoClosedForm
 from potto.calculus.surfaces.lifted import closed_value, lifted
 from potto.calculus.surfaces.nested_brackets import nested
@@ -23,6 +23,7 @@ from potto.calculus.surfaces.trace import spine
 from potto.core.terms import (
     ZERO,
     App,
+    Array,
     Branch,
     Delta,
     Deriv,
@@ -30,14 +31,18 @@ from potto.core.terms import (
     Index,
     Integral,
     Lam,
+    ListOf,
     Prim,
     Sum,
     Term,
     Var,
     add,
     app,
+    array,
     children,
     deriv,
+    fresh,
+    length,
     postorder,
     rebuild,
     substitute,
@@ -49,13 +54,14 @@ from potto.core.terms import (
 )
 from potto.diagnostics import PottoError, declare
 from potto.kernels import errors
-from potto.kernels.cells import Cell, Value
+from potto.kernels.cells import Cell, Rows, Value
 from potto.runtime.evaluation.functions import Closure, Derivative
 from potto.runtime.evaluation.reach import Reach, kept
 from potto.runtime.integration.arrays import holds
 
 NOT_COUNTED = declare("P0510", "deltas of a derivative that were not found")
 
+_FUNCTIONS = (Lam, Deriv, Global)
 FEW = 4  # branches that one integrand may have before its summands are integrated apart
 
 
@@ -155,20 +161,30 @@ def filled(term: Integral, env: dict[str, Value], reach: Reach) -> tuple[Integra
         given |= {new: value for new, value in joined.items() if isinstance(value, Closure)}
         derived = _derived_parameters(term)
     if Deriv in reach.kinds(term):
-        term = _with_tangents(term, frozenset(name for name in term.free if isinstance(env[name], Cell)))
+        numbers = frozenset(name for name in term.free if isinstance(env[name], Cell))
+        rows = frozenset(n for n in term.free if isinstance(row := env[n], Rows) and isinstance(row.item, Cell))
+        term = _with_tangents(term, numbers, rows, reach)
     return term, env
 
 
-@lru_cache(maxsize=4096)
-def _with_tangents(term: Integral, numbers: frozenset[str]) -> Integral:
-    """The integral, with tangents that are 0 where a number that it is given stands for a dual."""
+@kept
+def _with_tangents(term: Integral, numbers: frozenset[str], rows: frozenset[str], reach: Reach) -> Integral:
+    """The integral, with tangents that are 0 where a number or an array that it is given stands for a dual."""
+
+    def alone(arg: Term) -> Term:
+        """An argument of a derivative, with its tangent if it has none."""
+        if isinstance(arg, Var):
+            still = ZERO if arg.name in numbers else array(fresh("k", term.free), length(arg), ZERO)
+            return tuple_((arg, still)) if arg.name in numbers | rows else arg
+        known = named(arg, reach.resolve) if isinstance(arg, Global) else arg
+        plain = isinstance(known, Array | ListOf) and not any(isinstance(n, _FUNCTIONS) for n in postorder(known))
+        return tuple_((arg, zero_like(known))) if plain and known is not None else arg
 
     def change(_: Term, new: Term) -> Term:
         head = spine(new)[0] if isinstance(new, App) else None
         if not isinstance(new, App) or not isinstance(head, Deriv) or isinstance(head.function, Deriv):
             return new
-        args = (tuple_((arg, ZERO)) if isinstance(arg, Var) and arg.name in numbers else arg for arg in new.args)
-        return app(new.function, tuple(args))
+        return app(new.function, tuple(map(alone, new.args)))
 
     found = transform(term, change)
     assert isinstance(found, Integral)
