@@ -25,7 +25,7 @@ quick: $(STAMP)  ## the tests that take no time
 
 fuzz: $(STAMP)  ## every law, with examples that nobody has seen
 	$(TESTS) --hypothesis-profile=explore tests/properties tests/primitives tests/arrays tests/calculus tests/core tests/integrate \
-		tests/ide/test_every_offset.py tests/lsp/test_lsp_every_offset.py
+		tests/ide/test_every_offset.py tests/lsp/test_lsp_every_offset.py tests/lsp/test_lsp_fuzz.py tests/lsp/test_lsp_text.py tests/crew
 
 test-bridges: $(STAMP)  ## JAX, PyTorch and scipy: installed into .venv (PyTorch for the CPU), their own gradient checks run
 	$(BIN)/python -m pip install -qq --disable-pip-version-check 'jax>=0.4.36' optax

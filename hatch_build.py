@@ -2,7 +2,8 @@
 
 Owns the hook that `pyproject.toml` names, with the list of modules beside it. mypyc makes an extension of each module
 and puts it next to its source, so that the same package works with and without; only the time differs. Wheels without
-it are pure Python, and so are editable installations: machine code of an older text would hide the text.
+it are pure Python, and so are editable installations: machine code of an older text would hide the text. With
+`MYPYC_OPT_LEVEL=0` the C compiler takes half the time, and what it makes is slower.
 
 What is a `value` becomes a dataclass, which mypyc knows, but for its `__init__`, which it leaves to the interpreter.
 Those are written out for it, which makes values in a tenth of the time; the other methods they are given behind their
@@ -13,6 +14,7 @@ tracebacks still name the right ones.
 from __future__ import annotations
 
 import ast
+import os
 import shutil
 import subprocess
 import sys
@@ -28,7 +30,7 @@ SETUP = """
 from mypyc.build import mypycify
 from setuptools import setup
 
-compiled = mypycify({modules}, opt_level="2", debug_level="0", multi_file=True)
+compiled = mypycify({modules}, opt_level={optimized!r}, debug_level="0", multi_file=True)
 setup(name="potto", packages=[], ext_modules=compiled)
 """
 # Types are checked elsewhere, with all that is imported; here nothing but the hook's own dependencies is to be had.
@@ -61,7 +63,8 @@ class FrontEndHook(BuildHookInterface[Any]):
         for module in self._modules():
             path = self._folder / module
             path.write_text(with_inits(path.read_text("utf-8")), "utf-8")
-        (self._folder / "setup.py").write_text(SETUP.format(modules=self._modules()))
+        level = os.environ.get("MYPYC_OPT_LEVEL", "2")
+        (self._folder / "setup.py").write_text(SETUP.format(modules=self._modules(), optimized=level))
         (self._folder / "mypy.ini").write_text(MYPY)
         command = [sys.executable, "setup.py", "build_ext", "--inplace"]
         done = subprocess.run(command, cwd=self._folder, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)

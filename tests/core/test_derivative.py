@@ -108,10 +108,6 @@ def test_builtins_and_choices(term: Term) -> None:
         integral(("x",), ((mul(t, t), ONE),), x),
         integral(("x",), ((t, neg(t)),), prim("exp", x)),
         integral(("x",), ((neg(INF), t),), BELL, ((ZERO,),)),
-        pytest.param(integral(("x", "y"), ((ZERO, t), (ZERO, mul(t, x))), mul(x, y, t)), marks=pytest.mark.slow),
-        pytest.param(
-            integral(("x", "y"), ((ZERO, ONE), (x, add(x, t))), prim("cos", mul(x, y))), marks=pytest.mark.slow
-        ),
         pytest.param(integral(("x",), ((ZERO, t),), integral(("y",), ((x, t),), mul(t, y))), marks=pytest.mark.slow),
         mul(t, area(bracket(sub(x, HALF)), "x")),
         area(mul(t, bracket(sub(x, HALF))), "x"),

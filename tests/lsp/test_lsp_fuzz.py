@@ -7,6 +7,7 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
+from how_many import examples
 from lsp_client import Client, edit
 from potto_lsp.features import FEATURES
 
@@ -92,6 +93,6 @@ def test_a_short_storm(server: Server, uri: Uri, seed: int) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(100, 120))
+@pytest.mark.parametrize("seed", range(100, 100 + examples(6, 20)))
 def test_a_long_storm(server: Server, uri: Uri, seed: int) -> None:
     run(server, uri, seed, 3_000)

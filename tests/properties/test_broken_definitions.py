@@ -11,6 +11,7 @@ import time
 
 import pytest
 from edited_programs import WORKSPACE, broken, library
+from how_many import examples
 
 from potto.checking.check import definition_diagnostics, has_errors
 from potto.checking.library import Library
@@ -20,7 +21,7 @@ from potto.syntax import parse_chunk
 from potto.types import interface
 
 ROOT = "/broken"
-MUTATIONS = int(os.environ.get("POTTO_MUTATIONS", "2000"))
+MUTATIONS = int(os.environ.get("POTTO_MUTATIONS", examples(600, 2000)))
 RECOVERY = 0.010  # seconds within which 99 in 100 are read, mistakes and all
 
 

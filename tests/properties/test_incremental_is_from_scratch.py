@@ -6,6 +6,7 @@ from collections.abc import Hashable
 from typing import Any
 
 import pytest
+from how_many import examples
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -90,7 +91,7 @@ def check(root: str, script: list[Edit], asking: list[bool]) -> None:
 
 quick = settings(max_examples=25, deadline=None, database=None, derandomize=True,
                  suppress_health_check=list(HealthCheck))  # fmt: skip
-thorough = settings(quick, max_examples=400)
+thorough = settings(quick, max_examples=examples(100, 400))
 pytestmark = pytest.mark.filterwarnings("ignore:The recursion limit")
 
 
