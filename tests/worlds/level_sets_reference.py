@@ -10,6 +10,7 @@ are by complex steps of 1e-30, which lose no digits: functions are given complex
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import cache
 from itertools import combinations, pairwise
 from typing import Any
 
@@ -22,6 +23,7 @@ Function = Callable[[Any, Any, Given], Any]  # of x, y and parameters
 ANGLE = 0.37  # generic: no picture has edges in that direction
 STEP = 1e-30
 STEPS = 60  # of Newton's method, halved intervals where it leaves them
+TO_MEET = 20  # of it from many places at once, some of which get there sooner
 
 
 def integral(
@@ -36,7 +38,7 @@ def integral(
     """
     scene = _Scene(surfaces, colour, box, given)
     places = scene.places(seeds)
-    rule, weights = np.polynomial.legendre.leggauss(nodes)
+    rule, weights = _gauss(nodes)
     s = 0.5 + 0.5 * rule
     value, slopes = 0.0, dict.fromkeys(given, 0.0)
     for a, b in pairwise(places):
@@ -107,7 +109,7 @@ class _Scene:
         """Where both are 0, by Newton's method from many places; what does not get there is left out."""
         size = max(self.reach)
         with np.errstate(all="ignore"):
-            for _ in range(STEPS):
+            for _ in range(TO_MEET):
                 along_u = [np.asarray(each(u + 1j * STEP, v, self.given) + 0j * u) for each in (f, g)]
                 (p, q), (pu, qu) = [x.real for x in along_u], [x.imag / STEP for x in along_u]
                 pv, qv = (np.imag(each(u, v + 1j * STEP, self.given) + 0j * u) / STEP for each in (f, g))
@@ -172,7 +174,7 @@ class _Scene:
 
     def section(self, u: float, roots: list[tuple[float, int]], across: int) -> tuple[float, dict[str, float]]:
         """The integral along a section, and its derivatives."""
-        nodes, weights = np.polynomial.legendre.leggauss(across)
+        nodes, weights = _gauss(across)
         ends = np.array([v for v, _ in roots])
         low, gap = ends[:-1, None], np.diff(ends)[:, None]
         v = low + gap * (0.5 + 0.5 * nodes)
@@ -180,7 +182,7 @@ class _Scene:
         w = np.where(seen, 0.5 * gap * weights, 0.0)
         colours = np.where(seen, np.real(self.colour(u, v, self.given) + 0j * v), 0.0)
         value = float((w * colours).sum())
-        limits = colours @ _ends(nodes)  # signs of curves are lost to rounding where two roots are about to merge
+        limits = colours @ _ends(across)  # signs of curves are lost to rounding where two roots are about to merge
         slopes = {}
         for name in self.given:
             moved = {**self.given, name: self.given[name] + 1j * STEP}
@@ -197,7 +199,13 @@ class _Scene:
         return value, slopes
 
 
-def _ends(nodes: Array) -> Array:
-    """What gives the values of a polynomial at -1 and 1 by those at the nodes, (nodes, 2)."""
-    inside, ends = (np.polynomial.legendre.legvander(at, nodes.size - 1) for at in (nodes, np.array([-1.0, 1.0])))
+@cache
+def _gauss(n: int) -> tuple[Array, Array]:
+    return np.polynomial.legendre.leggauss(n)
+
+
+@cache
+def _ends(n: int) -> Array:
+    """What gives the values of a polynomial at -1 and 1 by those at n nodes of Gauss, (n, 2)."""
+    inside, ends = (np.polynomial.legendre.legvander(at, n - 1) for at in (_gauss(n)[0], np.array([-1.0, 1.0])))
     return np.asarray(np.linalg.solve(inside.T, ends.T))
