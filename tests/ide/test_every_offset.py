@@ -100,7 +100,7 @@ def ask_about_file(library: Library, file: str, text: str, whole: Span) -> None:
 @pytest.mark.parametrize("name", FILES)
 def test_every_feature_here_and_there(name: str) -> None:
     library, file, text = opened(name)
-    ask_everything(library, file, text, range(0, len(text) + 1, 12))
+    ask_everything(library, file, text, range(0, len(text) + 1, examples(31, 12)))
 
 
 @pytest.mark.slow
@@ -109,7 +109,7 @@ def test_every_feature_all_along(name: str) -> None:
     """Those that look through the workspace, and every action and proposal resolved; the others as well where there is
     time to ask them everywhere."""
     library, file, text = opened(name)
-    offsets = range(0, len(text) + 1, examples(11, 1))
+    offsets = range(0, len(text) + 1, examples(29, 1))
     if LOOKING:
         ask_everything(library, file, text, offsets)
     db = library.db
@@ -163,7 +163,7 @@ def test_every_feature_on_broken_text(seed: int) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(100, 100 + examples(30, 60)))
+@pytest.mark.parametrize("seed", range(100, 100 + examples(12, 60)))
 def test_every_feature_on_many_broken_texts(seed: int) -> None:
     rng = random.Random(seed)
     name = rng.choice(FILES)

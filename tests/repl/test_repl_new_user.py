@@ -16,7 +16,8 @@ from potto_repl.script import entries
 HERE = Path(__file__).parent
 GOLDEN = HERE / "new_user_transcript.txt"
 # What is measured or rounded differently from machine to machine.
-_CHANGING = ((r"(?:^.*[│└].*\n)+.*\n", "[picture]\n"), (r"± \([^)]*\)", "± #"), (r"(at \w+ = \d\.\d{5})\d+", r"\1"),
+_CHANGING = ((r"\n?^exact, .*$", ""),  # said where it took long enough to be noticed
+             (r"(?:^.*[│└].*\n)+.*\n", "[picture]\n"), (r"± \([^)]*\)", "± #"), (r"(at \w+ = \d\.\d{5})\d+", r"\1"),
              (r"[\d,.]+ (?:ms|s)\b", "# ms"), (r"± \d(?:\.\d)?e-\d+", "± #"), (r"[\d,]+ evaluations", "# evaluations"),
              (r"slope \d\.\de-\d+", "slope #"), (r"= \d(?:\.\d+)?e-\d\d\b", "= #"), (r"\d+ steps", "# steps"),
              (r"\d+ points, error at most \d\.\de-\d+", "# points, error at most #"),
