@@ -25,7 +25,7 @@ def unseen(work: PanelBatch, p: Pieces) -> tuple[Array, Array] | None:
     """What whole segments may have missed next to their left and to their right end, (C, S) each, where what lies
     beyond is much shorter than they are; None where no segment has such a neighbour."""
     seg = work.seg
-    if work.last or p.coefficients is None:
+    if work.last or p.coefficients is None or work.machine.overdrawn():
         return None
     length = seg.b - seg.a
     sides, finite = _beyond(seg), seg.kind < substitution.UP

@@ -29,7 +29,7 @@ def paced(work: PanelBatch) -> Segments:
     """The segments, those that are infinite on one side with a pace of their own where their integrands tell one."""
     seg = work.seg
     rows = np.nonzero((seg.kind == substitution.UP) | (seg.kind == substitution.DOWN))[0]
-    if not rows.size or not work.last:
+    if not rows.size or not work.last or work.machine.overdrawn():
         return seg
     pace = seg.pace.copy()
     pace[rows] = _pace(_held(work, rows))
