@@ -9,9 +9,11 @@ from functools import lru_cache
 
 import numpy as np
 
+from potto.calculus.differentiation.derivative import NotSmooth
 from potto.calculus.inlining.arrays import MOST_STEPS, TooMany, each_integral, inlined, loops, summands, unrolled
 from potto.calculus.inlining.lattices import by_cells
 from potto.calculus.inlining.reads import Access, hoisted
+from potto.calculus.solving.pivots import NoClosedForm
 from potto.core.terms import Index, Integral, Term, function_of, substitute, tuple_, var
 from potto.diagnostics import PottoError, declare
 from potto.kernels import errors
@@ -20,6 +22,7 @@ from potto.kernels.making import making
 from potto.runtime.evaluation.functions import Closure
 from potto.runtime.evaluation.machine import Machine
 from potto.runtime.evaluation.reach import Reach, kept
+from potto.runtime.integration.uncounted import not_found
 
 TOO_LONG = declare("P0515", "a loop under an integral is too long to be written out")
 
@@ -64,7 +67,12 @@ def without_arrays(machine: Machine, term: Integral, env: Env) -> tuple[Term, En
 
 @kept
 def _outside(term: Integral, arrays: frozenset[str], reach: Reach) -> Term:
-    found = by_cells(inlined(term, lambda name: Index in reach.kinds(name), reach.resolve, arrays))
+    try:
+        found = by_cells(inlined(term, lambda name: Index in reach.kinds(name), reach.resolve, arrays))
+    except (NoClosedForm, NotSmooth) as problem:
+        raise not_found(str(problem)) from None
+    if not found.free <= term.free:
+        raise not_found("what is differentiated is out of sight")
     if isinstance(found, Integral):  # else its cells are sums around it already
         # Around an integral the index of a sum is plain: what each summand looks up at places of its own has cells.
         found = each_integral(summands(found, look_ups=False), by_cells)

@@ -52,14 +52,13 @@ from potto.core.terms import (
     var,
     with_integrand,
 )
-from potto.diagnostics import PottoError, declare
+from potto.diagnostics import PottoError
 from potto.kernels import errors
 from potto.kernels.cells import Cell, Rows, Value
 from potto.runtime.evaluation.functions import Closure, Derivative
 from potto.runtime.evaluation.reach import Reach, kept
 from potto.runtime.integration.arrays import holds
-
-NOT_COUNTED = declare("P0510", "deltas of a derivative that were not found")
+from potto.runtime.integration.uncounted import NOT_COUNTED, not_found
 
 _FUNCTIONS = (Lam, Deriv, Global)
 FEW = 4  # branches that one integrand may have before its summands are integrated apart
@@ -233,11 +232,13 @@ def _counted(term: Integral, reach: Reach, again: bool) -> Integral:
     try:
         body = Differentiator(reach.resolve).carried_out(term.body)
     except (NoClosedForm, NotSmooth) as problem:
-        raise _not_found(str(problem)) from None
+        raise not_found(str(problem)) from None
     variables = frozenset(term.variables)
     calls = [node for node in postorder(body) if isinstance(node, App) and node.free & variables]
-    if any(reach.deltas(call.function) or _is_unknown(call.function) for call in calls):
-        raise _not_found("what is differentiated is out of sight")
+    if not body.free <= term.body.free or any(
+        reach.deltas(call.function) or _is_unknown(call.function) for call in calls
+    ):
+        raise not_found("what is differentiated is out of sight")
     before = {node for node in postorder(term.body) if isinstance(node, Delta)}
     found = any(isinstance(n, Delta) and n not in before and n.coordinates[0].free & variables for n in postorder(body))
     return with_integrand(term, body) if found or again else term
@@ -251,13 +252,6 @@ def _is_unknown(function: Term) -> bool:
         if not isinstance(head, Deriv | Global | Lam | Var):
             return True
     return False
-
-
-def _not_found(reason: str) -> PottoError:
-    return PottoError([NOT_COUNTED(
-        errors.NOWHERE, f"the deltas of a derivative under this integral were not found: {reason}",
-        help="differentiate the integral as a whole",
-    )])  # fmt: skip
 
 
 @lru_cache(maxsize=1024)
