@@ -7,6 +7,7 @@ from typing import NamedTuple
 from potto.source import Span
 from potto.syntax import kinds
 from potto.syntax.groups import Context, Values, Written
+from potto.syntax.habits import ARRAY_TYPE, ARRAYS
 from potto.syntax.nodes import (
     ArrayType,
     DiffeoType,
@@ -60,7 +61,9 @@ def type_indexed(context: Context, v: Values) -> TypeExpr:
         context.report(kinds.BAD_TYPE(span, "`Diffeo` takes the number of its variables, as in `Diffeo[2]`"))
         return DiffeoType(span, max(1, len(indices)))
     for token in numbers:
-        context.report(kinds.BAD_TYPE(token.span, f"`{head.text}[…]` names variables of integration, not numbers"))
+        message = f"`{head.text}[…]` names variables of integration, not numbers"
+        help = f"an array of {token.text} of them is `[{token.text}] {head.text}`"
+        context.report(kinds.BAD_TYPE(token.span, message, help=help))
     return _real(context, head, False, tuple(token.text for token in indices if token.kind == "NAME"), end)
 
 
@@ -73,7 +76,8 @@ def _real(context: Context, head: Token, star: bool, variables: tuple[str, ...],
     if head.text == "Diffeo":
         context.report(kinds.BAD_TYPE(span, "`Diffeo` takes the number of its variables, as in `Diffeo[2]`"))
     elif head.text != "Real" and head.text:
-        context.report(kinds.BAD_TYPE(head.span, f"there is no type `{head.text}`", help=_KNOWN))
+        help = ARRAY_TYPE if head.text in ARRAYS else _KNOWN
+        context.report(kinds.BAD_TYPE(head.span, f"there is no type `{head.text}`", help=help))
     return RealType(span, "Real", star, variables)
 
 

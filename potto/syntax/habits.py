@@ -21,8 +21,6 @@ if TYPE_CHECKING:
 _TYPE = re.compile(r"[A-Z([]")
 _STATEMENTS = {
     "while": "there are no loops but `for` over a list in a script; `sum i in 1..n (…)` adds, recursion repeats",
-    "class": "a value with named parts is a record: `record Camera(eye: Real, focal: Real)`",
-    "struct": "a value with named parts is a record: `record Camera(eye: Real, focal: Real)`",
     "function": "write `def f(x) …`",
     "func": "write `def f(x) …`",
     "fn": "write `def f(x) …`",
@@ -36,6 +34,10 @@ _STATEMENTS = {
     "raise": "errors cannot be raised",
     "global": "names of the file are known in its definitions",
 }
+
+ARRAYS = ("Array", "List", "Vec", "Vector", "array", "list", "vector", "ndarray", "Tensor")
+"""What other languages call the type of an array."""
+ARRAY_TYPE = "the type of an array starts with its size: `[n] Real`"
 
 _SEVERAL = re.compile(r"\s*\([^()]*\)\s*in\b")
 _OF_ARRAY = re.compile(r"\s*\(\s*([^\W\d]\w*)\s*\)")
@@ -60,7 +62,7 @@ def foreign_statement(tokens: list[Token]) -> Diagnostic | None:
 
 def habit(stop: Stop) -> Diagnostic | None:
     """The message for a stop that shows where its author comes from; None for any other."""
-    for known in (_lambda, _loop, _bounds, _sum):
+    for known in (_lambda, _loop, _bounds, _sum, _array, _range):
         found = known(stop)
         if found is not None:
             return found
@@ -163,6 +165,32 @@ def _sum(stop: Stop) -> Diagnostic | None:
         return kinds.UNEXPECTED(opening.span, "what goes through an array has one name", help=hint) if several else None
     message = "the variable of a `sum` stands without parentheses, its terms stand in them"
     return kinds.UNEXPECTED(opening.span, message, help="write `sum i in 1..n (body)`")
+
+
+def _array(stop: Stop) -> Diagnostic | None:
+    """The types `Real[]`, `Array(Real)`, `Vec<Real>` and `[n][m] Real`."""
+    at, before = stop.at, stop.before
+    if before is None:
+        return None
+    if before.text == "]" and at.text == "[":
+        help = "between the sizes of an array of arrays is a blank: `[n] [m] Real`"
+        return kinds.UNEXPECTED(at.span, "a type has no index", help=help)
+    empty = before.text == "[" and at.text == "]"
+    name = stop.tokens[stop.index - 2] if empty and stop.index > 1 else before
+    if name.text == "Real" if empty else name.text in ARRAYS and at.text in ("(", "<"):
+        return kinds.BAD_TYPE(name.span.cover(at.span), "this is not a type", help=ARRAY_TYPE)
+    return None
+
+
+def _range(stop: Stop) -> Diagnostic | None:
+    """`xs = 1:10`, `sum i in 1:10`."""
+    at, before, after = stop.at, stop.before, stop.after
+    if at.kind != "COLON" or stop.index < 2 or stop.tokens[stop.index - 2].kind not in ("EQ", "IN"):
+        return None
+    if before is None or before.kind != "NUMBER" or after is None or after.kind not in ("NUMBER", "NAME"):
+        return None
+    help = f"write `{before.text}..{after.text}` where a `sum`, a `for` or an array goes through it"
+    return kinds.UNEXPECTED(at.span, "a range has two dots", help=help)
 
 
 SEVERAL = "give its parts one name together: `sum p in ps (p.0*p.1)`"

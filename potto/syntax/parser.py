@@ -18,6 +18,7 @@ from potto.syntax.chunks import split
 from potto.syntax.consequences import Told, only, without_consequences
 from potto.syntax.engine import Engine
 from potto.syntax.foreign_integrals import foreign_integral
+from potto.syntax.foreign_records import declared_elsewhere, in_braces
 from potto.syntax.groups import Context
 from potto.syntax.habits import foreign_statement, habit
 from potto.syntax.lexer import MAX_LENGTH, Lexed, lex
@@ -74,16 +75,27 @@ def parse_chunk(text: str, diffeo: bool = False) -> ParsedChunk:
     item, diagnostics = None, lexed.diagnostics
     if not lexed.too_deep:
         item, diagnostics = _bounded(_parse(lexed, text, "chunk", diffeo))
-    foreign = foreign_statement(lexed.tokens) if diagnostics else None
+    foreign = _foreign(text, lexed.tokens) if diagnostics else None
     if foreign is not None:
-        item, diagnostics = BrokenItem(Span(0, len(text)), None), [foreign]
-    elsewhere = foreign_integral(text, lexed.tokens, diagnostics) if diagnostics and foreign is None else None
+        item, diagnostics = BrokenItem(Span(0, len(text)), foreign[0]), [foreign[1]]
+    elsewhere = _elsewhere(text, lexed.tokens, diagnostics) if foreign is None else None
     if elsewhere is not None:
         item, diagnostics = None, only(elsewhere, diagnostics)
     diagnostics = without_consequences(diagnostics)
     if item is None:
         item = _salvage(text, lexed.tokens, diffeo)
     return ParsedChunk(item, _sorted(diagnostics), comments)
+
+
+def _foreign(text: str, tokens: list[Token]) -> tuple[str | None, Diagnostic] | None:
+    """What is said of a chunk that is one of another language as a whole, and the name that it defines."""
+    said = foreign_statement(tokens)
+    return declared_elsewhere(text, tokens) if said is None else (None, said)
+
+
+def _elsewhere(text: str, tokens: list[Token], found: list[Diagnostic]) -> Diagnostic | None:
+    """What is said of text with errors that is right in another language."""
+    return (foreign_integral(text, tokens, found) or in_braces(text, found)) if found else None
 
 
 def parse_expression(text: str) -> ParsedExpression:
@@ -95,7 +107,7 @@ def parse_expression(text: str) -> ParsedExpression:
     expr, diagnostics = None, lexed.diagnostics
     if not lexed.too_deep:
         expr, diagnostics = _bounded(_parse(lexed, text, "expression"))
-    elsewhere = foreign_integral(text, lexed.tokens, diagnostics) if diagnostics else None
+    elsewhere = _elsewhere(text, lexed.tokens, diagnostics)
     if elsewhere is not None:
         expr, diagnostics = None, only(elsewhere, diagnostics)
     return ParsedExpression(expr if expr is not None else broken, _sorted(without_consequences(diagnostics)))

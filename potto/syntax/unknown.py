@@ -11,6 +11,7 @@ from potto.syntax import kinds
 from potto.syntax.suggesting import take_out, write
 from potto.syntax.tokens import FIRST_NAME, PLAIN_OPERATOR
 
+_DATA = re.compile(r"\.(csv|tsv|npy|npz|png|jpe?g|json)$", re.IGNORECASE)
 _MEANT = {
     "!": ("write `not`", "not"),
     "%": ("Potto has no remainder; `x - floor(x/n)*n` is one", ""),
@@ -94,6 +95,8 @@ def string_literal(text: str, word: str, span: Span) -> Diagnostic:
     inner = word.strip(word[0])
     name = (suggest(span, inner),) if FIRST_NAME.fullmatch(inner) else ()
     help, suggestions = "take the quotes out to use a name", (*name, *take_out(text, span))
+    if _DATA.search(inner):
+        help, suggestions = f'write `load("{inner}")`, with what it holds as a value of the program', ()
     return kinds.OTHER_LANGUAGE(span, "Potto has no text strings", help=help, suggestions=suggestions)
 
 

@@ -24,9 +24,8 @@ def loaded(inference: Inference, node: nodes.Apply) -> Type:
     """The type of what a file holds."""
     given = node.arguments[0].value if len(node.arguments) == 1 else None
     if not isinstance(given, nodes.Text):
-        for argument in node.arguments:
-            inference.infer(argument.value)
-        help = 'write the name of a file between quotes: `load("heights.csv")`'
+        meant = f"{given.path}.{given.name}" if isinstance(given, nodes.Member) else "heights.csv"
+        help = f'write the name of a file between quotes: `load("{meant}")`'
         place, label = node.span, f"{len(node.arguments)} given"
         if given is not None:
             place, label = given.span, "not a name in quotes"

@@ -11,6 +11,7 @@ from potto.modules.lookup import resolve as resolve_name
 from potto.modules.texts import definition
 from potto.reports.near import did_you_mean, instead, near_names
 from potto.syntax import nodes
+from potto.syntax.habits import ARRAY_TYPE, ARRAYS
 from potto.syntax.kinds import BAD_TYPE
 from potto.types import kinds
 from potto.types.context import Inference, Part, rule
@@ -72,6 +73,8 @@ def _no_type(inference: Inference, annotation: nodes.NamedType, meaning: Meaning
     else:
         near = ("Real",) if name.lower() in _NUMBERS else _near(inference, name)
     leaf = name.rpartition(".")[2]
+    if name in ARRAYS:
+        return BAD_TYPE(annotation.span, message, label=label, help=ARRAY_TYPE)
     help = did_you_mean(near) or f"types are {known}, and records: `record {leaf}(x: Real)`"
     return BAD_TYPE(annotation.span, message, label=label, help=help, suggestions=instead(annotation.span, near))
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from potto.diagnostics import Diagnostic, Related, Suggestion, suggest
+from potto.modules.hints import known_elsewhere
 from potto.source import Span
 from potto.syntax import nodes
 from potto.types import kinds
@@ -151,7 +152,7 @@ def _no_part(inference: Inference, found: Type, name: str, span: Span, place: in
     else:
         message = f"this is {describe(found)}, which has no part `.{name}`"
         if isinstance(found, ArrayOf):
-            help = f"an element is `xs[{place or 0}]`"
+            help = known_elsewhere(name) or f"an element is `xs[{place or 0}]`"
             if place is not None:
                 suggestions = (suggest(Span(span.start - 1, span.end), f"[{place}]"),)
     return kinds.NO_FIELD(span, message, label=label, help=help, suggestions=suggestions)
@@ -275,21 +276,31 @@ def expect_array(
     if not isinstance(found, Unknown):
         inference.report(kinds.NOT_AN_ARRAY(
             expr.span, f"{what}, but this is {describe(found)}", label=f"this is `{format_type(found)}`",
-            help=_instead(found, index), suggestions=suggestions,
+            help=_instead(found, index, expr), suggestions=suggestions,
         ))  # fmt: skip
     return UNKNOWN
 
 
-def _instead(found: Type, index: bool) -> str:
+def _instead(found: Type, index: bool, expr: nodes.Expr) -> str:
     from potto.types.types import Function
 
     if isinstance(found, Function):
         return "a function is called with parentheses: `f(i)`"
+    if isinstance(found, TupleOf) and found.record is not None:
+        column = next((name for name, item in zip(found.record.fields, found.items) if _is_array(item)), None)
+        if column is not None:
+            one = f"{expr.id if isinstance(expr, nodes.Name) else 'u'}.{column}"
+            return f"it has arrays as its fields: `{one}[i]` for `i in 0..len({one}) - 1`"
+        return f"its fields are {', '.join(f'`{name}`' for name in found.record.fields[:4])}"
     if isinstance(found, TupleOf):
         return "the parts of a tuple are `u.0`, `u.1`, …; an array is written `[a, b]`"
     if resolve(found) is REAL:
         return "" if index else "to count up to it, write `0..n-1`"
     return ""
+
+
+def _is_array(type: Type) -> bool:
+    return isinstance(resolve(type), ArrayOf)
 
 
 _FORMS: dict[str, Callable[[Inference, nodes.Apply], Type]] = {
