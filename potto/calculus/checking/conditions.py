@@ -1,9 +1,9 @@
 """The conditions that vary under the integrals of a definition, also those that calls lead to.
 
-Owns `conditions_of` and `skeleton`. A function exports what `skeleton` keeps of it: its branches, deltas and calls,
-over its parameters; so a caller's check reads no more of a callee than that. Conditions that a callee has over its own
-variables of integration alone are the callee's to check, unless a function that the caller passed brought them in or
-decides them.
+Owns `conditions_of`, `called_by` and `skeleton`. A function exports what `skeleton` keeps of it: its branches, deltas
+and calls, over its parameters; so a caller's check reads no more of a callee than that. Conditions that a callee has
+over its own variables of integration alone are the callee's to check, unless a function that the caller passed brought
+them in or decides them.
 
 So a call is only entered if a variable of integration or a function goes in with its arguments, and a call of what
 leads to no condition is not exported: a definition costs by its own size and not by all that lies below its calls.
@@ -56,6 +56,7 @@ from potto.core.terms import (
 )
 
 MOST_CALLS = 1000  # that are entered for one definition: calls with ever new arguments may double at each level
+UNNAMED = "a function"  # in `calls`: one that is written where it is called
 _TWICE = 2  # how often one definition may stand on the path of calls: a recursion repeats its conditions
 
 
@@ -89,6 +90,11 @@ class Condition(Struct, frozen=True):
     @property
     def variables(self) -> tuple[str, ...]:
         return tuple(v for v in self.box if any(v in c.free for c in self.coordinates))
+
+
+def called_by(calls: Sequence[str]) -> str:
+    """The `calls` of a condition in words, the one that it stands in first."""
+    return ", called by ".join(c if c == UNNAMED else f"`{c}`" for c in reversed(calls))
 
 
 def skeleton(term: Term, leads_on: Callable[[Global], bool] = lambda _: True) -> Term:
@@ -249,7 +255,7 @@ class _Walk:
             caller = frozenset(self.box)
         if caller.isdisjoint(head.free) and not self.goes_in(groups, caller, place):
             return
-        name, path = "a function", place.path
+        name, path = UNNAMED, place.path
         function: Term | None = head
         if isinstance(head, Global):
             if path.count(head) >= _TWICE or len(path) >= DEEPEST:

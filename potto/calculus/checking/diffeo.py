@@ -13,7 +13,7 @@ from functools import lru_cache
 from msgspec import Struct
 from msgspec.structs import replace
 
-from potto.calculus.checking.conditions import Condition, conditions_of, has_conditions, skeleton
+from potto.calculus.checking.conditions import Condition, called_by, conditions_of, has_conditions, skeleton
 from potto.calculus.checking.map_shapes import many, unknown_call, wrong_shape
 from potto.calculus.checking.solvability import (
     COMPONENTS,
@@ -234,7 +234,7 @@ def _readable(condition: Condition) -> Condition:
 def _diagnostic(problem: Problem, span: Span, calls: Sequence[str] = ()) -> Diagnostic:
     notes = problem.notes
     if calls:
-        notes = (*notes, "the condition is inside " + ", called by ".join(f"`{c}`" for c in reversed(calls)))
+        notes = (*notes, f"the condition is inside {called_by(calls)}")
     return problem.kind(span, problem.message, label=problem.label, notes=notes, help=problem.help)
 
 

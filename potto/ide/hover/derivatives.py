@@ -10,7 +10,7 @@ from collections.abc import Iterable
 
 from msgspec import Struct
 
-from potto.calculus.checking.conditions import conditions_of
+from potto.calculus.checking.conditions import called_by, conditions_of
 from potto.calculus.checking.diffeo import DiffeoInfo, diffeo_info, exported
 from potto.calculus.checking.solvability import Problem, Verdict, judge
 from potto.calculus.explanation.explain import equation, explain_derivative
@@ -272,7 +272,7 @@ def _facts(info: ConditionInfo) -> list[str]:
     if info.determinant:
         facts.append(f"- determinant: {code(info.determinant)}")
     if info.calls:
-        facts.append(f"- inside {', called by '.join(code(c) for c in reversed(info.calls))}")
+        facts.append(f"- inside {called_by(info.calls)}")
     return facts
 
 
