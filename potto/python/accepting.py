@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import contextlib
 import numbers
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -19,7 +19,7 @@ from potto.kernels.cells import Rows
 from potto.python.arrays import axes_of
 from potto.runtime.answers.estimate import Estimate
 from potto.types.still import values_of
-from potto.types.types import ArrayOf, Dist, Real, RecordName, TupleOf, Type, resolve
+from potto.types.types import ArrayOf, Dist, Function, Real, RecordName, TupleOf, Type, resolve
 
 PLAIN = (numbers.Real, np.ndarray, np.bool_, Estimate, Rows, str, bytes, tuple, list, Mapping)
 
@@ -49,12 +49,26 @@ def record_in(type: Type | None) -> RecordName | None:
     return item.record if isinstance(item, TupleOf) else None
 
 
-def with_tangents(argument: Any, type: Type | None) -> Any:
-    """An argument of a derivative; a tuple or a record that is given alone together with its tangents, which are 0."""
+def with_tangents(argument: Any, type: Type | None, derived: Callable[[Any], Any]) -> Any:
+    """An argument of a derivative; a tuple or a record that is given alone together with its tangents, which are 0, and
+    functions in it, or in an array, together with theirs, by `derived`."""
     values = None if type is None else values_of(type)
-    if values is None or not _is_like(argument, values):
-        return argument
-    return argument, _zeros(argument, values)
+    if values is not None and _is_like(argument, values):
+        return argument, _zeros(argument, values)
+    found = None if type is None else resolve(type)
+    if isinstance(found, TupleOf) and not found.dual:
+        parts = _parts(argument, found)
+        return argument if parts is None else tuple(_moving(*pair, derived) for pair in zip(parts, found.items))
+    if isinstance(found, ArrayOf) and isinstance(argument, list):
+        return [_moving(item, found.item, derived) for item in argument]
+    return argument
+
+
+def _moving(argument: Any, type: Type, derived: Callable[[Any], Any]) -> Any:
+    """A part of an argument of a derivative."""
+    if isinstance(resolve(type), Function):
+        return derived(argument)
+    return with_tangents(argument, type, derived) if isinstance(argument, tuple | Mapping | list) else argument
 
 
 def _is_like(argument: Any, type: Type) -> bool:

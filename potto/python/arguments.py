@@ -262,7 +262,14 @@ def _estimate(name: str, argument: Estimate, batch: Batch, to_function: ToFuncti
     plain = argument.value if argument.tangent is None else (argument.value, argument.tangent)
     if plain is None:
         raise no_kind(name, argument, "this answer is a function and not a number")
+    if _holds_functions(plain):
+        message = f"`{name}` holds functions, of which an answer has no more than their places"
+        raise wrong_call(message, "give its parts: `(2.0, f)`, or a dictionary by the names of its fields")
     return value_of(name, plain, batch, to_function)
+
+
+def _holds_functions(value: Any) -> bool:
+    return value is None or (isinstance(value, tuple | list) and any(map(_holds_functions, value)))
 
 
 def evenly(lo: float, hi: float, count: int) -> np.ndarray[Any, np.dtype[np.float64]]:
@@ -319,7 +326,7 @@ def _complaint(name: str, argument: Any, type: Type, own: Type | None) -> str | 
         case Function() | Diffeo():
             if own is None:
                 return f"a function is needed, not {_kind(argument)}"
-            if _is_dual(result_of(type)) and not _is_dual(result_of(own)):
+            if is_dual(result_of(type)) and not is_dual(result_of(own)):
                 return "the derivative of a function is needed, `potto.deriv(…)` of the one that is given"
             return None
         case _ if own is not None:
@@ -336,9 +343,9 @@ def _complaint(name: str, argument: Any, type: Type, own: Type | None) -> str | 
             return None
 
 
-def _is_dual(type: Type) -> bool:
+def is_dual(type: Type) -> bool:
     """A dual, or a tuple of them."""
-    return isinstance(type, TupleOf) and (type.dual or all(_is_dual(resolve(item)) for item in type.items))
+    return isinstance(type, TupleOf) and (type.dual or all(is_dual(resolve(item)) for item in type.items))
 
 
 def _tuple_misfit(name: str, argument: Any, items: tuple[Type, ...], dual: bool) -> str | None:

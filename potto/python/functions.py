@@ -20,7 +20,18 @@ from potto.evaluating.world import World
 from potto.kernels.cells import Rows, Value
 from potto.kernels.errors import wrong_call
 from potto.python.accepting import accepted, with_tangents
-from potto.python.arguments import NUMBERS, Batch, Kinds, batch_of, kinds_of, misfit, moving, numbers_of, value_of
+from potto.python.arguments import (
+    NUMBERS,
+    Batch,
+    Kinds,
+    batch_of,
+    is_dual,
+    kinds_of,
+    misfit,
+    moving,
+    numbers_of,
+    value_of,
+)  # fmt: skip
 from potto.python.arrays import has_arrays, with_arrays
 from potto.python.calls import Call, Form
 from potto.python.described import Doc, annotations_of, signature_of, typeset_derivative
@@ -132,8 +143,8 @@ class Function(Travelling):
 
         def taken(label: str, argument: Any, type: Type | None) -> Any:
             argument = accepted(argument, type)
-            if isinstance(argument, tuple | Mapping) and self._is_derivative():
-                argument = with_tangents(argument, type)
+            if isinstance(argument, tuple | Mapping | list) and self._is_derivative():
+                argument = with_tangents(argument, type, _derived)
             return with_arrays(label, argument, type, sizes) if arrays and type is not None else argument
 
         found = iter([taken(*each) for each in labelled(given, groups)])
@@ -261,6 +272,12 @@ class Function(Travelling):
 def _type_of(argument: Any) -> Type | None:
     """The type of an argument that is a function."""
     return argument._type if isinstance(argument, Function) else None
+
+
+def _derived(argument: Any) -> Any:
+    """The derivative of a function that is none; anything else as it is."""
+    plain = isinstance(argument, Function) and not is_dual(result_of(argument._type))
+    return deriv(argument) if plain else argument
 
 
 def _function_value(argument: Any) -> Value | None:

@@ -123,3 +123,27 @@ def f(t) g([sin, square], t)
 """)
     assert module.f(0.5).value == pytest.approx(0.5, rel=1e-13)
     assert module.f(0.25).value == pytest.approx(1 / 16, rel=1e-13)
+
+
+HOLDERS = potto.compile("""
+record P(w: Real, f: Real -> Real)
+def weighed(p: P, t) p.w*p.f(t)
+def both(fs: (Real -> Real, Real -> Real), t) fs.0(t) + fs.1(2*t)
+def total(fs: [n] (Real -> Real), t) sum f in fs (f(t))
+def square(x) x^2
+def wave(x) sin(x)
+""")
+
+
+def test_what_holds_functions_is_given_to_a_derivative_as_it_is() -> None:
+    m = HOLDERS
+    for p in ((2.0, m.square), ((2.0, 0.0), potto.deriv(m.square))):
+        found = potto.deriv(m.weighed)(p, (3.0, 1.0))
+        assert (found.value, found.tangent) == (18.0, 12.0)
+    assert abs(potto.deriv(m.both)((m.square, m.wave), (0.5, 1.0)).tangent - (1 + 2 * math.cos(1))) < 1e-14
+    assert abs(potto.deriv(m.total)([m.square, m.wave], (0.5, 1.0)).tangent - (1 + math.cos(0.5))) < 1e-14
+
+
+def test_an_answer_that_holds_functions_is_no_argument() -> None:
+    with pytest.raises(potto.PottoError, match="`p` holds functions"):
+        HOLDERS.weighed(HOLDERS.P(2.0, HOLDERS.square), 3.0)
