@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import sys
-from types import FrameType
-
 import pytest
+from call_counts import calls_in
 
 import potto
 
@@ -23,19 +21,8 @@ def chain(kind: str, n: int) -> str:
 
 
 def calls(source: str) -> int:
-    """How many functions are called while a program is checked: the same on any machine."""
-    count = 0
-
-    def one(frame: FrameType, event: str, argument: object) -> None:
-        nonlocal count
-        count += event == "call"
-
-    sys.setprofile(one)
-    try:
-        potto.compile(source)
-    finally:
-        sys.setprofile(None)
-    return count
+    """How many functions are called while a program is checked."""
+    return calls_in(lambda: potto.compile(source))
 
 
 @pytest.mark.parametrize("kind", KINDS)

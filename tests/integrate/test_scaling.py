@@ -6,11 +6,11 @@ Evaluations of integrands are counted, and calls of functions, Python's and nump
 from __future__ import annotations
 
 import itertools
-import sys
 from collections.abc import Callable
 from typing import Any
 
 import pytest
+from call_counts import calls_in
 
 import potto
 
@@ -55,20 +55,7 @@ def builtins(n: int) -> tuple[str, dict[str, float]]:
 
 def counted(call: Callable[[], Any]) -> tuple[int, int]:
     """Evaluations, and calls of functions, once everything is made."""
-    call()
-    calls = 0
-
-    def seen(frame: Any, event: str, argument: Any) -> None:
-        nonlocal calls
-        calls += event in ("call", "c_call")
-
-    before = sys.getprofile()
-    sys.setprofile(seen)
-    try:
-        answer = call()
-    finally:
-        sys.setprofile(before)
-    return answer.evals, calls
+    return call().evals, calls_in(call)
 
 
 @pytest.mark.parametrize("made, sizes", [

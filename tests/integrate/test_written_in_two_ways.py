@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Callable
 from typing import Any
 
 import pytest
+from call_counts import calls_in
 
 import potto
 
@@ -47,22 +46,6 @@ def asked(bounds: str, condition: str) -> tuple[Any, int]:
 
     call()
     return call(), calls_in(call)
-
-
-def calls_in(call: Callable[[], Any]) -> int:
-    count = 0
-
-    def seen(frame: Any, event: str, argument: Any) -> None:
-        nonlocal count
-        count += event in ("call", "c_call")
-
-    before = sys.getprofile()
-    sys.setprofile(seen)
-    try:
-        call()
-    finally:
-        sys.setprofile(before)
-    return count
 
 
 @pytest.mark.parametrize(("name", "bounds", "one", "other", "exact"), PAIRS, ids=[row[0] for row in PAIRS])

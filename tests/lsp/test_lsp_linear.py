@@ -3,12 +3,12 @@ queries, not by the clock."""
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
 import pytest
+from call_counts import calls_in
 from potto_lsp.asking import Ask
 from potto_lsp.client import Client
 from potto_lsp.documents import Document
@@ -98,23 +98,6 @@ def ask(session: Session, method: str, text: Text) -> Any:
         return FEATURES[method].answer(Ask(session, params))
 
 
-def calls(run: Callable[[], Any]) -> int:
-    """How many functions are called, those of C among them."""
-    count = 0
-
-    def note(frame: Any, event: str, argument: Any) -> None:
-        nonlocal count
-        count += event in ("call", "c_call")
-
-    before = sys.getprofile()
-    sys.setprofile(note)
-    try:
-        run()
-    finally:
-        sys.setprofile(before)
-    return count
-
-
 @contextmanager
 def asked(program: Callable[[int], str], n: int) -> Iterator[tuple[Session, Text]]:
     made = session()
@@ -125,15 +108,15 @@ def asked(program: Callable[[int], str], n: int) -> Iterator[tuple[Session, Text
 
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("name", PROGRAMS)
-def test_four_times_the_file_takes_four_times_the_calls(name: str, method: str) -> None:
+def test_four_times_the_file_takes_four_times_the_calls_in(name: str, method: str) -> None:
     """Cold, after the file was checked, and once more after a key at its end."""
     found: list[tuple[int, int]] = []
     for n in (FEW // 4, FEW, MANY):  # the first one loads what is loaded once
         with asked(PROGRAMS[name], n) as (made, text):
-            cold = calls(lambda: ask(made, method, text))
+            cold = calls_in(lambda: ask(made, method, text))
             edited = put(made, text.text.rstrip("\n") + "9\n" if name != "script" else text.text + "print(9)\n", 2)
             made.analysis.diagnostics("/nowhere/whole.po")
-            found.append((cold, calls(lambda: ask(made, method, edited))))  # noqa: B023
+            found.append((cold, calls_in(lambda: ask(made, method, edited))))  # noqa: B023
     (_, _), (few_cold, few_warm), (many_cold, many_warm) = found
     assert many_cold <= MOST * few_cold + 200, found
     assert many_warm <= MOST * few_warm + 200, found

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import sys
-from typing import Any
-
 import pytest
+from call_counts import calls_in
 
 from potto.syntax import format_source
 
@@ -29,20 +27,8 @@ SHAPES = {
 
 
 def calls(text: str) -> int:
-    """How many functions are called, those of C among them, while a text is laid out."""
-    count = 0
-
-    def note(frame: Any, event: str, argument: Any) -> None:
-        nonlocal count
-        count += event in ("call", "c_call")
-
-    before = sys.getprofile()
-    sys.setprofile(note)
-    try:
-        format_source(text)
-    finally:
-        sys.setprofile(before)
-    return count
+    """How many functions are called while a text is laid out."""
+    return calls_in(lambda: format_source(text))
 
 
 @pytest.mark.parametrize("shape", SHAPES)

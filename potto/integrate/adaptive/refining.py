@@ -39,6 +39,7 @@ PROMISING = 1e-2
 # itself, however short the piece (`exp(t)` under a normal density).
 ROUGH, SMOOTH = 1e-8, 1e-12
 DOUBTFUL_ROUNDS = 8
+TOO_LITTLE = 8  # how many times more than an error, or rounding, tells is missed
 COUNTS = 0.01  # the part of what an error may be from which on it counts what was missed beside an end
 LONG = 8  # after how many halvings it is looked for members that take longer than the others
 
@@ -84,13 +85,15 @@ def integrated(work: PanelBatch) -> Sums:
 
 
 def beside_short_ones(work: PanelBatch, p: Pieces) -> Pieces:
-    """Whole segments, of which those are halved and graded that have missed something next to an end."""
+    """Whole segments, of which those are halved and graded that have missed something next to an end, of which their
+    own errors say too little: what these tell is refined as anything else is."""
     missed = unseen(work, p)
     if missed is None:
         return p
     owner, size = work.seg.owner[p.segment], by_either_form(work, p.size)
     total = np.stack([np.bincount(owner, row, minlength=work.batch)[owner] for row in size])
-    least = np.maximum(8 * p.floor, COUNTS * np.maximum(work.machine.atol, work.machine.rtol * total))
+    known = TOO_LITTLE * np.maximum(p.error, p.floor)
+    least = np.maximum(known, COUNTS * np.maximum(work.machine.atol, work.machine.rtol * total))
     left, right = ((part > least).any(axis=0) for part in missed)
     if not (there := left | right).any():
         return p
