@@ -170,7 +170,7 @@ def test_the_mean_over_seeds_is_the_exact_number(problem: Problem) -> None:
 @pytest.mark.parametrize("method", ["mc", "qmc"])
 @pytest.mark.parametrize("problem", PROBLEMS, ids=lambda p: p.name)
 def test_reported_errors_cover_what_is_wrong(problem: Problem, method: str) -> None:
-    count = examples(100)
+    count = examples(300)
     seeds = range(count) if method == "mc" else range(0, 200 * count, 1_000)
     values, tangents = scores(problem, method, seeds)
     for found in (values, tangents):

@@ -82,8 +82,10 @@ def _places(
 
 
 def _resting_at_0(value: Cell, owner: Ints) -> Ints:
-    """The members at one of whose places a number is 0 to rounding, and moves."""
-    there = (np.abs(value.v) <= CLEAR * (0.0 if value.e is None else value.e)) & _moves(value, owner.size)
+    """The members at one of whose places a number is 0 to rounding, and moves. At infinite bounds it may be infinite,
+    with an error that is so, too."""
+    there = np.isfinite(value.v) & (np.abs(value.v) <= CLEAR * (0.0 if value.e is None else value.e))
+    there = there & _moves(value, owner.size)
     return np.unique(owner[np.broadcast_to(there, owner.shape)])
 
 
