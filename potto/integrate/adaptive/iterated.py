@@ -20,12 +20,13 @@ from potto.integrate.decomposition.effective_range import concentrated, pulled_i
 from potto.integrate.decomposition.meetings import Row
 from potto.integrate.decomposition.sections import searched_rows
 from potto.integrate.decomposition.vanishing import vanishes
-from potto.integrate.degenerate.coincidences import Scene, count_places, count_slivers, note_folds
+from potto.integrate.degenerate.coincidences import count_places, count_slivers, note_folds
 from potto.integrate.degenerate.degeneracies import beneath, brush
 from potto.integrate.degenerate.empty_ranges import Collapsed, collapsed_ranges, count_collapsed
 from potto.integrate.degenerate.faces import Face
 from potto.integrate.degenerate.kinks import note_flat
 from potto.integrate.degenerate.narrow_panels import count_narrow
+from potto.integrate.degenerate.scene import Scene
 from potto.integrate.degenerate.undefined import lost_members, sides_at
 from potto.integrate.events import UNSEEN_MEETING, sides_hidden
 from potto.integrate.levels import LevelPlan

@@ -11,8 +11,8 @@ import numpy as np
 
 from potto.integrate.columns import distinct
 from potto.integrate.decomposition.cuts import Cuts
-from potto.integrate.degenerate.coincidences import Scene, around, placed
 from potto.integrate.degenerate.faces import THIN, Place, crossing, running, running_along, several
+from potto.integrate.degenerate.scene import Scene, around, placed
 from potto.integrate.events import Degenerate
 from potto.integrate.panels.panel_batch import PanelBatch
 from potto.integrate.pieces import Crossing, Pieces, take

@@ -15,7 +15,8 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from potto.integrate.decomposition.meetings import SEARCHED, Row, as_array, tangents
-from potto.integrate.degenerate.coincidences import Scene, one_by_one
+from potto.integrate.degenerate.coincidences import one_by_one
+from potto.integrate.degenerate.scene import Scene
 from potto.integrate.events import EMPTY_UNDEFINED, EMPTY_UNSEEN, Shortfall, TwoSided
 from potto.integrate.levels import LevelPlan
 from potto.integrate.pieces import Sums

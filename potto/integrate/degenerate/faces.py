@@ -19,7 +19,7 @@ from msgspec import Struct
 
 from potto.core.terms import Lam, Term, children, function_of
 from potto.integrate.columns import distinct
-from potto.integrate.degenerate.coincidences import CLEAR, Scene
+from potto.integrate.degenerate.scene import CLEAR, Scene
 from potto.integrate.pieces import Crossing, Evaluator, components, gather, still, take
 from potto.integrate.plan import Plan
 from potto.integrate.rules.gauss import EPS

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from potto.core.terms import Term, function_of
-from potto.integrate.degenerate.coincidences import CLEAR, Scene
+from potto.integrate.degenerate.scene import CLEAR, Scene
 from potto.integrate.degenerate.undefined import LOOKED_AT
 from potto.integrate.events import Along
 from potto.integrate.pieces import Evaluator, components, gather, still

@@ -13,7 +13,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from potto.integrate.degenerate.coincidences import Scene, placed
+from potto.integrate.degenerate.scene import Scene, placed
 from potto.integrate.events import TwoSided
 from potto.integrate.pieces import Sums, take
 from potto.integrate.rules import substitution

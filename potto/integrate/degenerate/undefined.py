@@ -14,7 +14,7 @@ import numpy as np
 from potto.core.terms import function_of
 from potto.integrate.columns import distinct
 from potto.integrate.decomposition.vanishing import vanishes
-from potto.integrate.degenerate.coincidences import Scene, placed, surfaces_at
+from potto.integrate.degenerate.scene import Scene, placed, surfaces_at
 from potto.integrate.events import undefined
 from potto.integrate.levels import LevelPlan
 from potto.integrate.pieces import Evaluator, gather, still, take
