@@ -109,7 +109,8 @@ def _joined(shapes: Shapes, parts: Sequence[Any], batch: Any, like: Any) -> Any:
 
 
 def _functions(torch: Any) -> Callable[..., Any]:
-    """Values, as autograd is to see them."""
+    """Values, as autograd is to see them: classes that inherit from those of PyTorch, which is imported when it is
+    asked for; so all of them are made in here."""
 
     def asked(question: str, moving: Any, still: Any, flat: Flat, sizes: Any) -> tuple[Any, ...]:
         rows = (tensor.detach().to("cpu", torch.float64).numpy() for tensor in (moving, still))
