@@ -43,7 +43,7 @@ _ELSEWHERE = {
     "zeros": "write `[0 for i in 0..n-1]`",
     "ones": "write `[1 for i in 0..n-1]`",
     "map": "write `[f(x) for x in xs]`",
-    "filter": "count what is meant in a sum: `sum x in xs ((if x > 0 then x else 0))`",
+    "filter": "leave out what is not meant in a sum: `sum x in xs (if x > 0 then x else 0)`",
     "reduce": "write `fold s = 0 for x in xs (s + x)`",
     "average": "write `(sum x in xs (x))/len(xs)`",
     "length": "write `len(xs)`",

@@ -99,9 +99,14 @@ def _columns(actual: Type, expr: nodes.Expr) -> str:
     """What to write where a table stands for one of its columns."""
     if not isinstance(actual, TupleOf) or actual.record is None or not isinstance(expr, nodes.Name | nodes.Member):
         return ""
-    fields = zip(actual.record.fields, actual.items)
-    arrays = [f"`{print_expression(expr)}.{name}`" for name, item in fields if isinstance(resolve(item), ArrayOf)]
-    return f"take one of its columns: {', '.join(arrays[:3])}" if arrays else ""
+    arrays = [f"`{print_expression(expr)}.{name}`" for name in array_fields(actual)[:3]]
+    return f"take one of its columns: {', '.join(arrays)}" if arrays else ""
+
+
+def array_fields(type: TupleOf) -> list[str]:
+    """The fields of a record that are arrays: of a table, its columns."""
+    fields = () if type.record is None else type.record.fields
+    return [name for name, item in zip(fields, type.items) if isinstance(resolve(item), ArrayOf)]
 
 
 def differs_in_size(actual: Type, expected: Type) -> bool:

@@ -215,8 +215,8 @@ def _not_annotated(node: nodes.Member, local: Local, records: list[str]) -> Diag
 def _no_module(node: nodes.Member, what: str, help: str = "") -> Diagnostic:
     if not help and is_builtin(node.name) and not what.startswith(f"`{node.path}`"):
         help = f"`{node.name}` is a builtin: write it without `{node.path}.`"
-    if not help and node.name in ("length", "size", "shape", "len", "count"):
-        help = f"write `len({node.path})`"
+    if not help and what.startswith(f"`{node.path}`"):
+        help = known_elsewhere(node.name)
     if not help and "." not in node.path:
         help = f"for a further parameter of a function, put blanks around the dot: `{node.path} . {node.name}`"
     message = f"{what}, so `{node.path}.{node.name}` is not defined"

@@ -16,7 +16,7 @@ from potto.types import kinds
 from potto.types.context import Inference, Part
 from potto.types.format import format_type, format_types
 from potto.types.lookups import image, interp
-from potto.types.mismatches import describe, no_field
+from potto.types.mismatches import array_fields, describe, no_field
 from potto.types.types import REAL, UNKNOWN, ArrayOf, Count, Diffeo, Meta, TupleOf, Type, Unknown, resolve
 from potto.types.unify import SIZES, unify
 
@@ -287,9 +287,8 @@ def _instead(found: Type, index: bool, expr: nodes.Expr) -> str:
     if isinstance(found, Function):
         return "a function is called with parentheses: `f(i)`"
     if isinstance(found, TupleOf) and found.record is not None:
-        column = next((name for name, item in zip(found.record.fields, found.items) if _is_array(item)), None)
-        if column is not None:
-            one = f"{expr.id if isinstance(expr, nodes.Name) else 'u'}.{column}"
+        if columns := array_fields(found):
+            one = f"{expr.id if isinstance(expr, nodes.Name) else 'u'}.{columns[0]}"
             return f"it has arrays as its fields: `{one}[i]` for `i in 0..len({one}) - 1`"
         return f"its fields are {', '.join(f'`{name}`' for name in found.record.fields[:4])}"
     if isinstance(found, TupleOf):
@@ -297,10 +296,6 @@ def _instead(found: Type, index: bool, expr: nodes.Expr) -> str:
     if resolve(found) is REAL:
         return "" if index else "to count up to it, write `0..n-1`"
     return ""
-
-
-def _is_array(type: Type) -> bool:
-    return isinstance(resolve(type), ArrayOf)
 
 
 _FORMS: dict[str, Callable[[Inference, nodes.Apply], Type]] = {
