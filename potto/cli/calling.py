@@ -91,16 +91,26 @@ def function_in(world: World, file: str, text: str) -> Function:
     return Function(world, file, tree, type)
 
 
-def argument_in(world: World, file: str, text: str) -> Any:
-    """What a parameter is given: a function, or numbers. Raises ProgramError."""
+def argument_in(world: World, file: str, text: str, name: str = "") -> Any:
+    """What a parameter, of this name if it is known, is given: a function, or numbers; records as dicts, so that their
+    fields find each other by name. Raises ProgramError."""
+    from potto.applications.fitting import by_fields
+    from potto.evaluating.given import as_typed
+    from potto.evaluating.world import EXPRESSION
     from potto.python.functions import Function
+    from potto.reports.render import ProgramError
     from potto.types.types import Diffeo
     from potto.types.types import Function as FunctionType
 
-    tree, type = world.typed(file, text)
-    if isinstance(type, FunctionType | Diffeo):
-        return Function(world, file, tree, type)
-    return world.evaluate(file, text).estimate.value
+    try:
+        tree, type = world.typed(file, text)
+        if isinstance(type, FunctionType | Diffeo):
+            return Function(world, file, tree, type)
+        return by_fields(world.evaluate(file, text).estimate.value, type)
+    except ProgramError as error:
+        if not all(located.file == EXPRESSION for located in error.located):
+            raise
+        raise as_typed(f"{name}=" if name else "", text, error.located, world) from None
 
 
 def arguments_in(world: World, file: str, given: Given) -> dict[str, Any]:
@@ -108,4 +118,4 @@ def arguments_in(world: World, file: str, given: Given) -> dict[str, Any]:
     from potto.evaluating.given import each_once
 
     each_once(given)
-    return {name: argument_in(world, file, text) for name, text in given}
+    return {name: argument_in(world, file, text, name) for name, text in given}

@@ -145,16 +145,15 @@ def _fitted(
 
 def _start(world: World, file: str, name: str, text: str) -> Any:
     """What a parameter starts at: numbers, records as dicts. Raises PottoError."""
-    from potto.applications.fitting import by_fields
     from potto.kernels.errors import wrong_call
 
     help = f"numbers are fitted; what stays as it is goes after --with: `--with {name}=…`"
     if text.lstrip("(").startswith("load("):  # what a table holds is what a fit is to, hardly ever what is fitted
         raise wrong_call(f"`{name}` starts at the numbers of a file, which are data", help)
-    value, (_, type) = argument_in(world, file, text), world.typed(file, text)
+    value = argument_in(world, file, text, name)
     if callable(value):
         raise wrong_call(f"`{name}` starts at something that is not a number", help)
-    return by_fields(value, type)
+    return value
 
 
 class _Progress:

@@ -30,6 +30,7 @@ from potto.core.terms import (
 from potto.elaborate.signatures import signature
 from potto.query import Database
 from potto.types import interface
+from potto.types.still import makes_dual
 from potto.types.types import (
     ANY_SIZE,
     REAL,
@@ -120,7 +121,10 @@ class Shapes:
                 given = tuple(Parameter(None, self.of(arg)) for arg in args if not isinstance(arg, Lam | Deriv))
                 if len(given) == len(args):
                     unify(as_tuple(found.parameters), as_tuple(given))
-                return resolve(found.result)
+                made = resolve(found.result)
+                if self.makes_record(function) and makes_dual(found, dict(enumerate(map(self.of, args)))):
+                    return derivative_type(made)
+                return made
             case App(function=Lam(body=body)):
                 return self.of(body)
             case _:

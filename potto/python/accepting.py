@@ -29,9 +29,12 @@ def accepted(argument: Any, type: Type | None) -> Any:
     if argument.__class__ is float or argument.__class__ is int:
         return argument
     found = None if type is None else resolve(type)
-    record = record_in(found)
-    if record is not None and hasattr(argument, "columns") and hasattr(argument, "to_numpy"):  # a table of pandas
-        return {str(name): argument[name] for name in argument.columns}
+    if isinstance(found, TupleOf) and found.dual and not isinstance(argument, tuple):  # without tangents
+        values = resolve(found.items[0])
+        found = values if isinstance(values, ArrayOf) else found
+    columns = _columns_of(argument) if record_in(found) is not None else None
+    if columns is not None:
+        return columns
     if isinstance(found, ArrayOf) and hasattr(argument, "to_numpy"):
         return argument  # with its labels, by which a gap is told
     if not isinstance(argument, PLAIN):
@@ -41,6 +44,14 @@ def accepted(argument: Any, type: Type | None) -> Any:
     if isinstance(found, TupleOf):
         return _tuple(argument, found)
     return argument
+
+
+def _columns_of(argument: Any) -> dict[str, Any] | None:
+    """A table of pandas, or an array of numpy whose elements have named parts, as its columns; None for others."""
+    if hasattr(argument, "columns") and hasattr(argument, "to_numpy"):
+        return {str(name): argument[name] for name in argument.columns}
+    names = argument.dtype.names if isinstance(argument, np.ndarray) else None
+    return None if names is None else {name: np.asarray(argument[name]) for name in names}
 
 
 def record_in(type: Type | None) -> RecordName | None:

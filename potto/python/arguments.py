@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import numbers
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -317,7 +317,12 @@ def _misfit_inside(name: str, argument: Any, type: Type) -> str | None:
         parts = (
             (f"{name}[{place}]", part, type.item) for place, part in enumerate(argument) if part.__class__ is not float
         )
-    found = (misfit(own, part, t, None) for own, part, t in parts if not isinstance(resolve(t), Function | Diffeo))
+    values = (tuple, list, float, np.ndarray, Mapping)
+    found = (
+        misfit(own, part, t, None)
+        for own, part, t in parts
+        if isinstance(part, values) or not isinstance(resolve(t), Function | Diffeo)
+    )
     return next((why for why in found if why is not None), None)
 
 
@@ -351,7 +356,7 @@ def is_dual(type: Type) -> bool:
 def _tuple_misfit(name: str, argument: Any, items: tuple[Type, ...], dual: bool) -> str | None:
     if dual and isinstance(items[0], ArrayOf) and isinstance(argument, list | np.ndarray | Rows):
         return None  # an array without tangents
-    if dual and not isinstance(argument, tuple | list):
+    if dual and not isinstance(argument, tuple | list | Mapping):
         return None  # a number given for a dual has tangent 0
     if isinstance(argument, Estimate):
         return None

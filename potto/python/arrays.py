@@ -47,8 +47,8 @@ def _fields(name: str, argument: Any, record: RecordName) -> Any:
     return tuple(given[field] for field in record.fields)
 
 
-def _must_have(name: str, argument: Any, given: Mapping[str, Any], record: RecordName) -> None:
-    """Raise PottoError where a record is given too few fields, or others."""
+def _must_have(name: str, argument: Any, given: Mapping[str, Any], record: RecordName, columns: bool = False) -> None:
+    """Raise PottoError where a record, or an array of them by `columns`, is given too few fields, or others."""
     missing = [field for field in record.fields if field not in given]
     unknown = [str(field) for field in given if field not in record.fields] if isinstance(argument, Mapping) else []
     if not missing and not unknown:
@@ -58,7 +58,8 @@ def _must_have(name: str, argument: Any, given: Mapping[str, Any], record: Recor
         told.append(f"has {', '.join(f'`{field}`' for field in unknown)}, which it does not know")
     near = next((close for field in unknown for close in near_names(field, missing)), None)
     hint = f"did you mean `{near}`?" if near else f"its fields are {', '.join(f'`{f}`' for f in record.fields)}"
-    raise wrong_call(f"`{name}` is {record.name}, but what is given {' and '.join(told)}", hint)
+    kind = f"[n] {record.shown}" if columns else record.shown
+    raise wrong_call(f"`{name}` is {kind}, but what is given {' and '.join(told)}", hint)
 
 
 def has_arrays(type: Type) -> bool:
@@ -80,13 +81,13 @@ def _array(name: str, argument: Any, type: ArrayOf, sizes: Sizes) -> Any:
     if isinstance(argument, list) and _of_numbers(type):
         with contextlib.suppress(TypeError, ValueError):  # of answers, or not of one shape
             axes = axes_of(type) or 0
-            numbers = np.array(argument, dtype=float) if argument else np.zeros((0,) * axes)
+            numbers = np.array(argument, dtype=float) if argument else np.zeros(_without_elements(type))
             argument = numbers if numbers.ndim <= axes else argument  # else of elements that are batches
     if isinstance(argument, np.ndarray):
         return _numpy(name, argument, type, sizes)
     if isinstance(argument, list):
         _agree(name, len(argument), type.size, sizes)
-        items = [with_arrays(name, item, type.item, sizes) for item in argument]
+        items = [with_arrays(f"{name}[{n}]", item, type.item, sizes) for n, item in enumerate(argument)]
         return listed(items) if items and all(isinstance(item, Rows) for item in items) else items
     return argument
 
@@ -123,12 +124,12 @@ def _columns(
     name: str, argument: Mapping[str, Any], size: Type, item: TupleOf, record: RecordName, sizes: Sizes
 ) -> Rows:
     """An array of records that is given as a dict of columns, one for each field."""
-    _must_have(name, argument, argument, record)
+    _must_have(name, argument, argument, record, columns=True)
     found: list[Rows] = []
     for field, type in zip(record.fields, item.items, strict=True):
         column = _array(f"{name}.{field}", argument[field], ArrayOf(size, type), sizes)
         if not isinstance(column, Rows):
-            raise wrong_call(f"`{name}.{field}` is a column of `[n] {record.name}`: an array of numbers is needed")
+            raise wrong_call(f"`{name}.{field}` is a column of `[n] {record.shown}`: an array of numbers is needed")
         if found and column.size != found[0].size:
             raise wrong_call(f"`{name}.{record.fields[0]}` has {found[0].size} elements, and `{field}` {column.size}")
         found.append(column)
@@ -168,6 +169,14 @@ def _numpy(name: str, argument: np.ndarray[Any, Any], type: ArrayOf, sizes: Size
     batch = argument.ndim - axes
     numbers = np.moveaxis(argument.astype(np.float64), range(batch), range(axes, argument.ndim))
     return _made(name, numbers, type, sizes)
+
+
+def _without_elements(type: Type) -> tuple[int, ...]:
+    """The shape of an array of this type that has no elements."""
+    found = resolve(type)
+    if isinstance(found, ArrayOf):
+        return (0, *_without_elements(found.item))
+    return (len(found.items), *_without_elements(found.items[0])) if isinstance(found, TupleOf) and found.items else ()
 
 
 def axes_of(type: Type) -> int | None:

@@ -24,11 +24,11 @@ from potto.types.context import Inference, Plan, rule
 from potto.types.forms import delta, deriv
 from potto.types.infer import is_known, special
 from potto.types.loading import loaded
-from potto.types.mismatches import between, comparison, describe, mismatch, no_field, sized_by
+from potto.types.mismatches import BY_PARTS, between, comparison, describe, mismatch, no_field, sized_by
 from potto.types.motionless import check_tangents, takes_duals
 from potto.types.scope import Builtin
 from potto.types.slopes import slope
-from potto.types.still import lacks_tangents, stands_still
+from potto.types.still import lacks_tangents, makes_dual, stands_still
 from potto.types.types import (
     REAL,
     UNKNOWN,
@@ -79,9 +79,24 @@ def _apply(inference: Inference, node: nodes.Apply) -> Type:
     variadic = _variadic(inference, node, types)
     if variadic is not None:
         return variadic
+    callee = _of_duals(inference, node, callee, types)
     groups = groups_of(callee) if is_known(inference, node.function) else (callee.parameters,)
     filling = _Filling(inference, node, groups, types, callee.result)
     return filling.result(callee) if filling.fill() else UNKNOWN
+
+
+def _of_duals(inference: Inference, node: nodes.Apply, callee: Function, types: Sequence[Type]) -> Function:
+    """A record's definition as what makes its dual, where that is given the duals of fields."""
+    made = resolve(callee.result)
+    record = _record_of(callee.parameters, made)
+    if record is None:
+        return callee
+    places = [record.fields.index(a.name) if a.name in record.fields else n for n, a in enumerate(node.arguments)]
+    if not makes_dual(callee, dict(zip(places, types))):
+        return callee
+    derived = inference.dual(made, node)
+    assert isinstance(derived, TupleOf)
+    return Function(tuple([Parameter(*field) for field in zip(record.fields, derived.items)]), derived)
 
 
 def _no_comparisons(inference: Inference, node: nodes.Apply, types: list[Type]) -> None:
@@ -366,8 +381,7 @@ class _Filling:
                 self._sized_by(place, expected),
             )
             if lacks_tangents(self.types[place], expected):
-                apart = "give the duals of its parts: `(value, tangent)` for a number, `deriv(f)` for a function `f`"
-                help = apart if holds_functions(expected) else "give its tangents as well: `(value, tangents)`"
+                help = BY_PARTS if holds_functions(expected) else "give its tangents as well: `(value, tangents)`"
                 said = replace(said, help=help)
             self.inference.report(said)
 

@@ -38,7 +38,7 @@ from potto.types.types import (
     dual_of_tuple,
     resolve,
 )
-from potto.types.unify import MAX_LEAVES, leaves, occurs, settle, unify
+from potto.types.unify import MAX_LEAVES, is_named_alike, leaves, occurs, settle, unify
 
 MOST_DUALS = 50  # that lead to each other: more than levels of functions of functions
 STACK = 8000  # frames: two per node, for 200 levels of nesting and what is written between them
@@ -253,7 +253,7 @@ class Inference:
         if expected.dual and isinstance(actual, Meta):
             self.later(lambda: self._fit_late(actual, expected))
             return True
-        same = isinstance(actual, TupleOf) and actual.record == expected.record
+        same = isinstance(actual, TupleOf) and is_named_alike(actual, expected)
         if same and isinstance(actual, TupleOf) and len(actual.items) == len(expected.items):
             fits = [self.fits(item, other) for item, other in zip(actual.items, expected.items)]
             return all(fits)

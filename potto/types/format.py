@@ -58,7 +58,7 @@ class _Printer:
             case Dist(variables):
                 return "Dist" + _over(variables)
             case TupleOf(record=record) if record is not None:
-                return record.name
+                return record.shown
             case TupleOf(items):
                 return f"({', '.join(map(self.text, items))})"
             case ArrayOf():

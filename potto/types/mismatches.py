@@ -29,10 +29,12 @@ from potto.types.types import (
     Truth,
     TupleOf,
     Type,
+    holds_functions,
     resolve,
 )
 from potto.types.unify import parts, unify
 
+BY_PARTS = "give the duals of its parts: `(value, tangent)` for a number, `deriv(f)` for a function `f`"
 _TABLES = (".csv", ".tsv")
 
 
@@ -54,7 +56,7 @@ def describe(type: Type) -> str:
         case Function():
             return f"a function `{format_type(found)}`"
         case TupleOf(record=record) if record is not None:
-            return f"a record `{record.name}`"
+            return f"a record `{record.shown}`"
         case TupleOf(items):
             return f"a tuple of {len(items)}"
         case ArrayOf(size):
@@ -79,7 +81,7 @@ def mismatch(
     if differs_in_size(actual, expected):
         kind, help = kinds.SIZES, "take as many of both"
     elif isinstance(resolve(actual), Function) and isinstance(resolve(expected), Function):
-        undone = _needs_deriv(actual, expected)
+        undone = needs_deriv(actual, expected)
         help = "give the derivative of the function: `deriv(…)`" if undone else ""
     elif isinstance(resolve(actual), Function):
         help = "apply the function to arguments"
@@ -90,17 +92,45 @@ def mismatch(
     elif isinstance(resolve(actual), ArrayOf) and isinstance(resolve(expected), Real):
         help = "write it for each element, `[… for x in xs]`, or take one, `xs[i]`"
     elif isinstance(resolve(expected), ArrayOf):
-        help = _columns(resolve(actual), expr)
+        help = _columns(resolve(actual), resolve(expected), expr)
+    elif is_whole_dual(actual, expected):
+        help = BY_PARTS
     message = f"{what} must be `{wanted}`, but this is `{shown}`"
     return kind(expr.span, message, label=f"this is `{shown}`", related=related, help=help)
 
 
-def _columns(actual: Type, expr: nodes.Expr) -> str:
-    """What to write where a table stands for one of its columns."""
+def is_whole_dual(actual: Type, expected: Type) -> bool:
+    """Whether a value and its tangent are given where functions in it want each part with its own."""
+    given, wanted = resolve(actual), resolve(expected)
+    if not isinstance(given, TupleOf) or not isinstance(wanted, TupleOf) or len(given.items) != 2:
+        return False
+    halves = [resolve(item) for item in given.items]
+    count = len(wanted.items)
+    return holds_functions(wanted) and all(isinstance(half, TupleOf) and len(half.items) == count for half in halves)
+
+
+def _columns(actual: Type, expected: Type, expr: nodes.Expr) -> str:
+    """What to write where a table stands for one of its columns, or for its rows."""
     if not isinstance(actual, TupleOf) or actual.record is None or not isinstance(expr, nodes.Name | nodes.Member):
         return ""
+    item = resolve(expected.item) if isinstance(expected, ArrayOf) else expected
+    if isinstance(item, TupleOf) and item.record is not None and actual.record.name.endswith(_TABLES):
+        return _rows(actual, actual.record, item.record, print_expression(expr))
     arrays = [f"`{print_expression(expr)}.{name}`" for name in array_fields(actual)[:3]]
     return f"take one of its columns: {', '.join(arrays)}" if arrays else ""
+
+
+def _rows(table: TupleOf, columns: RecordName, record: RecordName, name: str) -> str:
+    """What to write for the rows of a table as records; of columns that are no fields, and the reverse, which."""
+    missing = [f"`{field}`" for field in record.fields if field not in columns.fields]
+    if missing:
+        others = ", ".join(f"`{field}`" for field in columns.fields)
+        return f"it has no column {', '.join(missing)}, which `{record.name}` needs; its columns are {others}"
+    first = resolve(table.items[0])
+    size = resolve(first.size) if isinstance(first, ArrayOf) else first
+    last = size.number - 1 if isinstance(size, Count) else 0
+    fields = ", ".join(f"{field}={name}.{field}[i]" for field in record.fields)
+    return f"write its rows, `[{record.name}({fields}) for i in 0..{last}]`"
 
 
 def array_fields(type: TupleOf) -> list[str]:
@@ -153,7 +183,7 @@ def _named_sizes(type: Type) -> list[Meta]:
     return found
 
 
-def _needs_deriv(actual: Type, expected: Type) -> bool:
+def needs_deriv(actual: Type, expected: Type) -> bool:
     """Whether a function was given where the derivative of one is expected."""
     given, wanted = resolve(actual), resolve(expected)
     while isinstance(given, Function) and isinstance(wanted, Function):

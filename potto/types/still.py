@@ -1,17 +1,20 @@
 """Tuples and records without tangents where a derivative takes them with some: they stand still, as a number does, and
 the functions in them are derived.
 
-Owns `lacks_tangents` and `is_dual`, which types and elaboration both ask, and `stands_still`, whether a call may leave
-them out. A pair of numbers could be a number with its tangent: what is expected decides. So the derivative has to be
-one of a definition, whose type is known; and a term has to show what an argument is, since elaboration sees nothing
-else.
+Owns `lacks_tangents`, `makes_dual` and `is_dual`, which types and elaboration both ask, and `stands_still`, whether a
+call may leave them out. A pair of numbers could be a number with its tangent: what is expected decides. So the
+derivative has to be one of a definition, whose type is known; and a term has to show what an argument is, since
+elaboration sees nothing else.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from potto.syntax import nodes
 from potto.syntax.written import without_parentheses
 from potto.types.context import Inference
+from potto.types.mismatches import needs_deriv
 from potto.types.motionless import head_of
 from potto.types.scope import Builtin, Global, Local, Meaning
 from potto.types.types import (
@@ -28,7 +31,7 @@ from potto.types.types import (
     holds_functions,
     resolve,
 )
-from potto.types.unify import unify
+from potto.types.unify import is_named_alike, unify
 
 
 def lacks_tangents(actual: Type, expected: Type) -> bool:
@@ -74,6 +77,15 @@ def _primal(dual: Type, like: Type) -> Type | None:
             return None
 
 
+def makes_dual(record: Function, given: Mapping[int, Type]) -> bool:
+    """Whether the definition of a record is given the derivative of a function where it holds one: it makes the dual
+    then, of the duals of all fields. given: what its fields are given, by their places."""
+    made = resolve(record.result)
+    if not isinstance(made, TupleOf) or made.record is None or made.record.dual or not holds_functions(made):
+        return False
+    return any(needs_deriv(made.items[place], type) for place, type in given.items() if place < len(made.items))
+
+
 def is_dual(expected: Type) -> bool:
     """Whether a number with its tangent is expected."""
     wanted = resolve(expected)
@@ -103,7 +115,7 @@ def _alike(a: Type, b: Type, guess: bool = False) -> bool:
         case Real() | Dist():
             return isinstance(b, Real | Dist)
         case TupleOf(items):
-            if not isinstance(b, TupleOf) or a.record != b.record or len(items) != len(b.items):
+            if not isinstance(b, TupleOf) or not is_named_alike(a, b) or len(items) != len(b.items):
                 return False
             return all(_alike(item, other, guess) for item, other in zip(items, b.items))
         case ArrayOf(item=item):

@@ -37,12 +37,19 @@ class Dist:
 @value
 class RecordName:
     """Which record a tuple is: its definition, and the names of the fields. texts: the columns of a file of data that
-    are not among them, as they hold no numbers."""
+    are not among them, as they hold no numbers. dual: it is the dual of one that holds functions, whose fields are the
+    duals of its."""
 
     file: str
     name: str
     fields: tuple[str, ...]
     texts: tuple[str, ...] = ()
+    dual: bool = False
+
+    @property
+    def shown(self) -> str:
+        """The name of the type."""
+        return f"D {self.name}" if self.dual else self.name
 
 
 @value
@@ -268,7 +275,7 @@ def dual_of_tuple(duals: tuple[Type, ...], dual: bool = False, record: RecordNam
     """
     pairs = [d.items for d in duals if _is_transposed(d)]
     if len(pairs) != len(duals):
-        return TupleOf(duals, dual)
+        return TupleOf(duals, dual, record and RecordName(record.file, record.name, record.fields, dual=True))
     values, tangents = (TupleOf(tuple(p[place] for p in pairs), record=record) for place in (0, 1))
     return TupleOf((values, tangents), dual or record is not None)
 

@@ -95,9 +95,17 @@ def as_tuple(parameters: tuple[Parameter, ...]) -> Type:
     return parameters[0].type if len(parameters) == 1 else TupleOf(tuple(p.type for p in parameters))
 
 
+def is_named_alike(a: TupleOf, b: TupleOf) -> bool:
+    """Whether two tuples are of one record, or of none. The dual of one that holds functions may be a plain tuple."""
+    if a.record is None or b.record is None:
+        record = a.record or b.record
+        return record is None or record.dual
+    return a.record == b.record
+
+
 def _unify_tuples(a: TupleOf | Diffeo, b: TupleOf | Diffeo) -> bool:
     if isinstance(a, TupleOf) and isinstance(b, TupleOf):
-        if len(a.items) != len(b.items) or a.record != b.record:
+        if len(a.items) != len(b.items) or not is_named_alike(a, b):
             return False
         fits = [unify(item, other) for item, other in zip(a.items, b.items)]
         return all(fits)

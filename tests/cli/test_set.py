@@ -122,9 +122,47 @@ def test_live_expressions_with_other_data(tmp_path: Path, capsys: pytest.Capture
 
 def test_what_is_wrong_with_a_value(program: str, capsys: pytest.CaptureFixture[str]) -> None:
     said = answered(capsys, "eval", program, "shade(2)", "--set", "c=1 +", status=1)
-    assert "<c>:1:3" in said and "P0101" in said
-    said = answered(capsys, "eval", program, "shade(2)", "--set", "c=grey", status=1)
-    assert "scene.po:2:5" in said and "P0201" in said
+    assert "--set c=1 +\n" in said and "<command line>:1:11" in said and "P0101" in said
+    said = answered(capsys, "eval", program, "shade(2)", "--set", "c=1 + grey", status=1)
+    assert "--set c=1 + grey\n" in said and "<command line>:1:13" in said and "P0201" in said
     # what follows stands in the lines where it was
     said = answered(capsys, "eval", program, "loss(1)", "--set", "shade=\\x . x", "--set", "c=(1, 2)", status=1)
     assert "scene.po:7:" in said
+
+
+POINTS = """\
+record Point(x: Real, y: Real)
+def total(ps: [n] Point, k) k*(sum p in ps (p.x*p.y))
+"""
+
+
+def test_a_table_is_an_array_of_records_by_the_names_of_its_columns(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("points.po").write_text(POINTS)
+    Path("points.csv").write_text("y,x\n2,1\n20,10\n")  # 2 + 200
+    Path("more.csv").write_text("x,Y\n2,1\n")
+    asked = ("deriv", "points.po", "total", "k=2", "--wrt", "k")
+    assert "total = 404" in answered(capsys, *asked, "ps=@points.csv")
+    assert "total = 404" in answered(capsys, *asked, "--set", "ps=@points.csv")
+    said = answered(capsys, *asked, "ps=@more.csv", status=1)
+    assert "`ps` is [n] Point, but what is given has no `y` and has `Y`" in said
+    for file, told in (
+        ("points.csv", "write its rows, `[Point(x=ps.x[i], y=ps.y[i]) for i in 0..1]`"),
+        ("more.csv", "it has no column `y`, which `Point` needs; its columns are `x`, `Y`"),
+    ):
+        assert told in answered(capsys, "eval", "points.po", "total(ps, 2)", "--set", f"ps=@{file}", status=1)
+
+
+def test_a_file_that_is_wrong_is_told_in_the_words_of_the_command_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("points.po").write_text(POINTS)
+    Path("bad.csv").write_text("x,y\n1,2\n3,abc\n")
+    said = answered(capsys, "eval", "points.po", "ps.x[0]", "--set", "ps=@bad.csv", status=1)
+    assert "bad.csv: line 3, column `y`" in said and "bad.csv:3:3" in said
+    assert "--set ps=@bad.csv\n" in said and "<command line>:1:10" in said and str(tmp_path) not in said
+    said = answered(capsys, "deriv", "points.po", "total", "k=2", "ps=@bad.csv:z", "--wrt", "k", status=1)
+    assert "| ps=@bad.csv:z\n" in said and "<command line>:1:4" in said and "bad.csv:3:3" in said

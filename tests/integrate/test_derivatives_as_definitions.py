@@ -68,6 +68,32 @@ def handed(t, s) let r = s in integral [0, 1] snd(deriv(step)((x*t, x), r)) d(x)
         assert abs(function(0.8, 0.5).value - 0.3 * 0.5 / 0.64) <= 1e-15
 
 
+@pytest.mark.parametrize(
+    ("call", "value", "tangent"),
+    [  # by t: of delta(x - t) x^k s t^k, of delta'(x - t) x -s
+        ("one((x - t, 0), (s, 1))", "t", "1"),
+        ("one(x - t, (s, x))", "t^2", "2*t"),
+        ("one((x - t, 1), (s, 0))", "-s", "0"),
+        ("all((x - t, 0), ([1, s], [1, 1]), (s, x))", "(1 + s)*t^2 + 2*s*t", "(1 + s)*2*t + 2*s"),
+        ("counted(x - t, (s, 1))", "6*t", "6"),
+        ("counted((x - t, 1), s)", "-6*s", "0"),
+    ],
+)
+def test_a_delta_of_what_is_derived_stands_still_or_moves(call: str, value: str, tangent: str) -> None:
+    name, given = call.split("(", 1)[0], call[call.index("(") :]
+    m = potto.compile(f"""
+def one(a, s) s*delta(a)
+def all(a, ys: [n] Real, s) sum y in ys (s*y*delta(a))
+def counted(a, s) sum i in 1..3 (s*i*delta(a))
+def f(t, s) integral [0, 1] x*snd(deriv({name}){given}) d(x)
+def expected(t, s) {value}
+def slope(t, s) {tangent}
+""")
+    got = potto.grad(m.f, "t")(0.4, 0.7)
+    assert abs(got.value - m.expected(0.4, 0.7).value) <= 2e-15  # some roundings
+    assert abs(got.tangent - m.slope(0.4, 0.7).value) <= 2e-15
+
+
 @pytest.mark.parametrize("given", ["[1, s]", "named", "local", "[s for i in 0..1]", "([1, s], [0, 0])", "xs"])
 def test_an_array_stands_for_a_dual_where_deltas_count(given: str) -> None:
     """d/dt of [y > 0.3] xs[1] + y at y = x t: the delta as above, and the integral of x."""

@@ -347,6 +347,20 @@ def test_records_in_an_array_are_dicts_or_columns_and_so_are_slopes_by_them() ->
         module.flat({"x": [1.0, 2.0], "r": [1.0]}, 0.5)
 
 
+def test_an_array_with_names_is_one_of_records() -> None:
+    """x r at 1, 2 and 3, 4, by names, whatever their order and kinds."""
+    module = potto.compile("record Disc(x: Real, r: Real)\ndef f(ds: [n] Disc, k) sum d in ds (k*d.x*d.r)")
+    discs = np.array([(2.0, 1), (4.0, 3)], dtype=[("r", "f4"), ("x", "i2")])
+    assert module.f(discs, 2.0).value == module.f(discs.view(np.recarray), 2.0).value == 28
+    assert module.f(discs[:0], 2.0).value == module.f([], 2.0).value == 0
+    assert potto.deriv(module.f)(discs, (2.0, 1.0)).tangent == 14
+    assert potto.deriv(module.f)((discs, discs), 2.0).tangent == 56
+    with pytest.raises(potto.PottoError, match=r"`ds` is \[n\] Disc, but what is given has no `x` and has `y`"):
+        module.f(np.zeros(2, dtype=[("r", "f8"), ("y", "f8")]), 2.0)
+    with pytest.raises(potto.PottoError, match=r"`ds\[1\]` is Disc, but what is given has no `x`"):
+        module.f([{"x": 1.0, "r": 2.0}, {"r": 2.0}], 2.0)
+
+
 def test_a_table_is_taken_by_its_names() -> None:
     """Not by the order of its columns, which numpy would see."""
 

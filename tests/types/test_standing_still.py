@@ -78,9 +78,13 @@ scene = [P(1, step), P(2, step)]
         ("deriv(h)(P(3, square) with w = 4, (2, 1))", 12, 8),
         ("deriv(g)((3, square), (2, 1))", 10, 7),
         ("deriv(g)(((3, 1), deriv(square)), (2, 1))", 10, 9),
+        ("deriv(h)(P(w=(3, 1), f=deriv(square)), (2, 1))", 10, 9),
+        ("deriv(h)(P(w=3, f=deriv(square)), (2, 1))", 10, 7),
+        ("deriv(h)(P((3, 1), deriv(square)) with w = (4, 0), (2, 1))", 12, 8),
         ("deriv(two)([square, square], (2, 1))", 12, 16),
         ("deriv(two)([sqrt, square], (4, 1))", 66, 48.25),
         ("deriv(all)([P(1, square), P(2, square)], (2, 1))", 20, 20),
+        ("deriv(all)([P((1, 1), deriv(square)), P((2, 0), deriv(square))], (2, 1))", 20, 28),
         ("deriv(all)([((1, 1), deriv(square)), ((2, 0), deriv(square))], (2, 1))", 20, 28),
     ],
 )
@@ -122,6 +126,28 @@ def test_from_python() -> None:
         assert potto.deriv(m.h)(p, (3.0, 1.0)).tangent == pytest.approx(1)
     scene = {"xs": np.array([1.0, 2.0]), "p": (3.0, 4.0)}
     assert potto.deriv(m.mesh)(scene, (5.0, 1.0)).tangent == pytest.approx(6)
+
+
+def test_records_that_hold_functions_are_dicts_from_python() -> None:
+    m = potto.compile(HOLDERS)
+    dh, df = potto.deriv(m.h), potto.deriv(m.square)
+    assert dh.type.startswith("(dp: D P, dt:")
+    for p, tangent in (({"w": 3.0, "f": m.square}, 7), ({"f": df, "w": (3.0, 1.0)}, 9), (((3.0, 1.0), df), 9)):
+        found = dh(p, (2.0, 1.0))
+        assert (found.value, found.tangent) == (10, tangent)
+    with pytest.raises(potto.PottoError, match=r"`dp.f` is .*: a function is needed, not a tuple of 2"):
+        dh(((3.0, m.square), (1.0, df)), (2.0, 1.0))
+    with pytest.raises(potto.PottoError, match="`dp` is D P, but what is given has no `f` and has `g`"):
+        dh({"w": 3.0, "g": m.square}, (2.0, 1.0))
+
+
+def test_a_dual_as_a_whole_of_what_holds_functions() -> None:
+    check("""
+        record P(w: Real, f: Real -> Real)
+        def h(p: P, t) p.w*t + (p.f)(t)
+        k = deriv(h)((P(1, sqrt), P(0, deriv(sqrt))), (2, 1))
+        #            ^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^ error[P0306]: must be `D P`, but this is `(P, D P)`
+    """)
 
 
 def test_where_nobody_can_tell() -> None:

@@ -106,7 +106,8 @@ def _writable(db: Database, file: str, type: Type) -> bool:
         case Real(variables=variables):
             return not variables
         case TupleOf(record=RecordName() as record):
-            return target_of(db, file, record.name) == DefinitionTarget(record.file, record.name)
+            meant = target_of(db, file, record.name) == DefinitionTarget(record.file, record.name)
+            return meant and not record.dual
         case TupleOf(items=items):
             return all(_writable(db, file, item) for item in items)
         case ArrayOf(size, item):  # a size by its name may be that of another array

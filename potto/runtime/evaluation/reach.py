@@ -31,8 +31,8 @@ class Reach:
         self.results: dict[Any, dict[Any, Any]] = {}
 
     def kinds(self, term: Term) -> frozenset[type]:
-        """Deriv, Branch and Integral, where there are such terms; Prim for a builtin with a kink, Index for what has to
-        do with arrays."""
+        """Deriv, Branch, Delta and Integral, where there are such terms; Prim for a builtin with a kink, Index for what
+        has to do with arrays."""
         found = self.known.get(term)
         if found is None:
             found = self.known[term] = frozenset(self._found(term))
@@ -56,9 +56,9 @@ class Reach:
         return found
 
     def deltas(self, term: Term) -> bool:
-        """Whether something that jumps is derived, or something that bends twice."""
+        """Whether something that jumps is derived, or has deltas itself, or something that bends twice."""
         found = self.derived(term)
-        return Branch in found or found >= {Deriv, Prim}
+        return bool(found & {Branch, Delta}) or found >= {Deriv, Prim}
 
     def spikes(self, function: Term) -> bool:
         """Whether what a function gives has deltas that no integral of its own is around."""
@@ -87,7 +87,7 @@ class Reach:
 
     def _found(self, term: Term) -> Iterator[type]:
         for node in self._all(term):
-            if isinstance(node, Deriv | Branch | Integral):
+            if isinstance(node, Deriv | Branch | Delta | Integral):
                 yield type(node)
             elif isinstance(node, ARRAYS):
                 yield Index
