@@ -36,16 +36,18 @@ def many(args: list[Value]) -> bool:
 
 def at_points(kernel: Kernel, rt: Runtime, trace: Trace | None, args: list[Value], backend: str) -> Value:
     """The value of a kernel that works point by point: by machine code once that pays, by numpy until then."""
-    if backend == "numpy" or trace or not all(isinstance(arg, Cell) for arg in args):
+    if backend == "numpy" or not all(isinstance(arg, Cell) for arg in args):
         return in_chunks(kernel, rt, trace, args)
+    sides = trace or {}  # a plain kernel calls nothing: masks are all that there is
     parts = [x for arg in args for x in (arg.v, arg.e, *arg.t, *arg.et)]  # type: ignore[union-attr]
     varying = tuple(part.__class__ is np.ndarray for part in parts)
-    found = kernel.native.get(varying)
+    forced = tuple([(at, side.__class__ is np.ndarray) for at, side in sides.items()])
+    found = kernel.native.get((varying, forced))
     if found is None:
-        found = kernel.native[varying] = Pointwise(kernel, varying, args)
+        found = kernel.native[varying, forced] = Pointwise(kernel, varying, forced, args)
     function = found.promotion.function(backend, found.text)
     if function is not None:
-        return found.run(function, rt, args)
+        return found.run(function, rt, sides, args)
     with found.promotion.by_numpy():
         return in_chunks(kernel, rt, trace, args)
 

@@ -17,9 +17,10 @@ from mpmath import mp
 from msgspec.structs import replace
 
 import potto
+from potto.calculus.surfaces.trace import Side, layout
 from potto.core import terms as core
 from potto.core.terms import Term
-from potto.kernels.cells import Cell, Value, all_cells
+from potto.kernels.cells import Cell, Trace, Value, all_cells
 from potto.projects.settings import DEFAULTS
 from potto.runtime.evaluate import Program
 
@@ -72,13 +73,23 @@ def cells(pick: random.Random, names: tuple[str, ...], shape: tuple[int, ...]) -
     }
 
 
-def outcome(whole: Term, env: dict[str, Value], backend: str, rounding: bool) -> list[Any]:
+def forced(pick: random.Random, whole: Term, shape: tuple[int, ...]) -> Trace:
+    """Sides for some of the branches of a term: everywhere the same, or not."""
+    generator = np.random.default_rng(pick.randrange(1 << 30))
+    return {
+        at: pick.random() < 0.5 if pick.random() < 0.4 else generator.random(shape) < 0.5
+        for at, site in enumerate(layout(whole).sites)
+        if isinstance(site, Side) and pick.random() < 0.7
+    }
+
+
+def outcome(whole: Term, env: dict[str, Value], backend: str, rounding: bool, trace: Trace | None = None) -> list[Any]:
     """All parts of a term's value."""
     machine = Program(lambda module, name: core.ZERO).machine(replace(DEFAULTS, backend=backend)).with_directions(1)
     machine = machine if rounding else machine.inside()
     function = core.function_of(whole)
     with np.errstate(all="ignore"):
-        value = machine.evaluate(function, {name: env[name] for name in function.params}, None)
+        value = machine.evaluate(function, {name: env[name] for name in function.params}, trace)
     return [part for cell in all_cells(value) for part in (cell.v, cell.e, *cell.t, *cell.et)]
 
 
@@ -88,9 +99,9 @@ def test_arithmetic_is_the_same_to_the_last_bit(seed: int) -> None:
     whole = arithmetic(pick, 4)
     shape = pick.choice(((COUNT,), (3, COUNT), (COUNT, 3), (5, 7, 60), (2, 3, 4, 100)))
     env, rounding = cells(pick, NAMES, shape), pick.random() < 0.5
-    for ours, theirs in zip(
-        outcome(whole, env, "native", rounding), outcome(whole, env, "numpy", rounding), strict=True
-    ):
+    trace = forced(pick, whole, shape) or None
+    native, numpy = (outcome(whole, env, backend, rounding, trace) for backend in ("native", "numpy"))
+    for ours, theirs in zip(native, numpy, strict=True):
         assert (ours is None) == (theirs is None)
         if ours is not None:
             np.testing.assert_array_equal(*np.broadcast_arrays(ours, theirs))

@@ -344,7 +344,9 @@ class _Run(Struct, dict=True):
     def weighted(self, sums: Sums, volume: Cell, n: int) -> Sums:
         k, size = self.machine.directions, volume.v
         v, t = sums.v * size, sums.t * size
-        e, et = ROUNDING * np.abs(v), ROUNDING * np.abs(t)
+        e, et = np.abs(v), np.abs(t)
+        e *= ROUNDING
+        et *= ROUNDING
         if sums.e.any() or sums.et.any():
             e, et = e + sums.e * np.abs(size), et + sums.et * np.abs(size)
         if any(x is not None for x in volume.t[:k]):

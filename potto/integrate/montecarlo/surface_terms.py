@@ -219,7 +219,7 @@ class Surface(Struct, dict=True):
                 smooth &= np.sign(high) - np.sign(low) == 2 * np.sign(slopes[j])
         odd = inside & ~smooth
         if odd.any():
-            rates[:, odd] = self.beside(labels, pivot, marked, point, root)[:, odd]
+            rates = np.where(odd, self.beside(labels, pivot, marked, point, root), rates)
         unknown = inside & np.isnan(rates).any(axis=0)
         if unknown.any():
             self.machine.note(UNKNOWN_JUMP)
@@ -233,11 +233,15 @@ class Surface(Struct, dict=True):
             above, below = self.off_the_surface(labels, pivot, n)
         else:
             above, below = self.both_sides(point, pivot, off)
-        rates = np.where(counts, rates, 0.0)
-        jump, error = np.where(counts, above.v - below.v, 0.0), np.where(counts, above.e + below.e, 0.0)
-        t = jump[:, None, :] * np.where(unknown, 0.0, rates)
-        et = np.where(unknown & (jump[:, None, :] != 0), np.inf, error[:, None, :] * np.abs(np.nan_to_num(rates)))
-        return t, et + ROUNDING * np.abs(t)
+        with np.errstate(invalid="ignore", over="ignore"):  # where it counts for nothing
+            jump, error = (above.v - below.v)[:, None, :], (above.e + below.e)[:, None, :]
+            t, et = jump * rates, error * np.abs(rates)
+            et += ROUNDING * np.abs(t)
+        if not counts.all():
+            t, et = np.where(counts, t, 0.0), np.where(counts, et, 0.0)
+        if unknown.any():
+            t, et = np.where(unknown, 0.0, t), np.where(unknown, np.where(jump != 0, np.inf, 0.0), et)
+        return t, et
 
     def both_sides(self, point: Point, pivot: int, off: Array) -> tuple[Sums, Sums]:
         """The integrand just above and just below the surface, at points that are `off` by so much along the pivot."""
@@ -250,7 +254,7 @@ class Surface(Struct, dict=True):
         sides = self.sides(frozen, n)
         with nullcontext() if costs is None else costs.apart(1.0):
             above = self.integrand(frozen, sides, n)
-            below = self.integrand(frozen, {g: np.logical_not(mask) for g, mask in sides.items()}, n)
+            below = self.integrand(frozen, {g: np.logical_not(side) for g, side in sides.items()}, n)
         return above, below
 
     def off_the_surface(self, labels: list[Array | None], pivot: int, n: int) -> tuple[Sums, Sums]:
@@ -291,7 +295,7 @@ class Surface(Struct, dict=True):
         """The sides of what the surface decides, just above it."""
         sides: dict[int, Mask] = {}
         for group, way in self.forces:
-            sides[group] = np.ones(n, dtype=bool) if way is None else self.chart.above(way, point.env, n)
+            sides[group] = True if way is None else self.chart.above(way, point.env, n)
         return sides
 
     def beside(
@@ -363,13 +367,14 @@ class Surface(Struct, dict=True):
         return env
 
     def slopes(self, phi: Term, point: Point, wide: int, n: int) -> tuple[Array, Array]:
-        """phi and its tangents: those of the parameters, then those of the labels."""
+        """phi and its tangents: those of the parameters, then those of the labels; (wide, 1) where they are the same
+        at all points."""
         function = function_of(phi)
         env = {name: pad(point.env[name], wide) for name in function.params}
         value = self.machine.with_directions(wide).evaluate(function, env, None)
         assert isinstance(value, Cell)
-        t = value.t or (None,) * wide
-        return as_array(value.v, n), np.stack([as_array(0.0 if x is None else x, n) + np.zeros(n) for x in t])
+        t = np.broadcast_arrays(*(0.0 if x is None else x for x in value.t or (None,) * wide))
+        return as_array(value.v, n), np.stack(t).reshape(wide, -1)
 
 
 def _reach(lo: Cell, hi: Cell, x: Array) -> Array:

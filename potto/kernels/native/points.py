@@ -1,8 +1,8 @@
 """A plain kernel as machine code over the points of a batch.
 
-Owns `Pointwise`: made for a kernel and for which parts of its arguments are arrays. What depends on none of these is
-computed by the kernel's own lines first; the arrays, which broadcast against each other, are gone through as rows of
-numbers that lie side by side.
+Owns `Pointwise`: made for a kernel, for which parts of its arguments are arrays, and for which sides a trace forces.
+What depends on none of these is computed by the kernel's own lines first; the arrays, which broadcast against each
+other, are gone through as rows of numbers that lie side by side.
 """
 
 from __future__ import annotations
@@ -15,18 +15,30 @@ from typing import Any
 import numpy as np
 from msgspec import Struct
 
-from potto.kernels.cells import Array, Cell, Value
+from potto.kernels.cells import Array, Cell, Trace, Value
 from potto.kernels.making import counts
 from potto.kernels.native.elementary import module
 from potto.kernels.native.objects import Loaded
 from potto.kernels.native.promotion import Promotion
-from potto.kernels.native.straight import NotStraight, Operation, Packed, Part, Result, Straight, needed, packed, read
+from potto.kernels.native.straight import (
+    SIDE,
+    NotStraight,
+    Operation,
+    Packed,
+    Part,
+    Result,
+    Straight,
+    needed,
+    packed,
+    read,
+)
 from potto.kernels.native.vectors import LANES, Vectors
 from potto.kernels.writing import Runtime
 from potto.kernels.written import Kernel
 
 NAME = "points"
 Parts = tuple[bool, ...]  # of all parts of all arguments, which are arrays
+Sides = tuple[tuple[int, bool], ...]  # the sites whose sides are forced, and whether not everywhere to the same
 
 
 class Layout(Struct, frozen=True):
@@ -43,18 +55,19 @@ class Layout(Struct, frozen=True):
 
 
 class Pointwise:
-    """A kernel for arguments some parts of which are arrays."""
+    """A kernel for arguments some parts of which are arrays, with some sides forced."""
 
-    def __init__(self, kernel: Kernel, varying: Parts, args: Sequence[Value]) -> None:
-        self.kernel = kernel
+    def __init__(self, kernel: Kernel, varying: Parts, forced: Sides, args: Sequence[Value]) -> None:
+        self.kernel, self.forced = kernel, forced
         every = [part for i, arg in enumerate(args) for part in _parts(i, arg)]
-        self.varying = frozenset(part for part, varies in zip(every, varying, strict=True) if varies)
+        found = {part for part, varies in zip(every, varying, strict=True) if varies}
+        self.varying = found.union(Part((at,), SIDE) for at, varies in forced if varies)
         self.promotion = Promotion(NAME)
         self.layout: Layout | None = None
 
     def text(self) -> str:
         """The function. Raises NotStraight."""
-        straight = Straight.of(self.kernel)
+        straight = Straight.of(self.kernel, (at for at, _ in self.forced))
         constant = straight.constant(name for name, part in straight.parts.items() if part not in self.varying)
         operations = straight.operations(constant)
         names = tuple(dict.fromkeys(name for cell in packed(straight.result) for name in cell.parts()))
@@ -73,15 +86,15 @@ class Pointwise:
         self.layout = Layout(straight.parts, uniform, prelude, given, arrays, outputs, straight.result)
         return _text(operations, arrays, given, outputs)
 
-    def run(self, function: Loaded, rt: Runtime, args: Sequence[Value]) -> Value:
+    def run(self, function: Loaded, rt: Runtime, trace: Trace, args: Sequence[Value]) -> Value:
         """The kernel's value; its arrays all have the shape of the batch."""
         layout = self.layout
         assert layout is not None
         parts = layout.parts
-        numbers = {name: _part(args, parts[name]) for name in layout.uniform}
+        numbers = {name: _part(args, trace, parts[name]) for name in layout.uniform}
         given = layout.prelude(rt, *numbers.values())
         constants = array("d", [0.0 if x is None else x for x in given])
-        arrays = [_part(args, parts[name]) for name in layout.arrays]
+        arrays = [_part(args, trace, parts[name]) for name in layout.arrays]
         shape = arrays[0].shape
         if not _flat(arrays, shape):
             shape = np.broadcast_shapes(*(a.shape for a in arrays))
@@ -97,7 +110,10 @@ class Pointwise:
         return _unpacked(layout.result, numbers)
 
 
-def _part(args: Sequence[Value], part: Part) -> Any:
+def _part(args: Sequence[Value], trace: Trace, part: Part) -> Any:
+    if part.kind == SIDE:
+        side = trace[part.path[0]]
+        return side.astype(float) if isinstance(side, np.ndarray) else bool(side)
     found = getattr(args[part.path[0]], part.kind)
     if part.kind in ("t", "et"):
         found = found[part.direction]
@@ -187,7 +203,8 @@ def _text(operations: Sequence[Operation], arrays: Sequence[str], given: Sequenc
         return at.at(memory, k, "double")
 
     for name, start in zip(arrays, starts, strict=True):
-        values[name] = at.load(place(start))
+        number = at.load(place(start))
+        values[name] = at.apply("ne", number, at.number(0.0)) if name in masks else number
     values = at.run(operations, values)
     for name, end in zip(outputs, into, strict=True):
         at.store(values[name], place(end))

@@ -30,6 +30,7 @@ FUNCTIONS = {
 }  # fmt: skip
 COMPARED = (*RELATIONS.values(), "and", "or", "not", "nan")
 CONSTANTS = ("inf", "nan", "True", "False")
+SIDE = "side"
 ZERO, HALF_ULP, A_TANGENT = repr(0.0), repr(UNIT_ROUNDOFF), repr(TWICE)
 
 
@@ -38,7 +39,10 @@ class NotStraight(Exception):
 
 
 class Part(Struct, frozen=True):
-    """A part of an argument: which one (and which item of it, where it is a tuple), and "v", "e", "t" or "et" of it."""
+    """A part of an argument: which one (and which item of it, where it is a tuple), and "v", "e", "t" or "et" of it.
+
+    Or, as "side", the mask that a trace has for a site, which is the path.
+    """
 
     path: tuple[int, ...]
     kind: str
@@ -94,9 +98,9 @@ class Straight(Struct, frozen=True):
     result: Result
 
     @classmethod
-    def of(cls, kernel: Kernel) -> Straight:
-        """The lines of a plain kernel. Raises NotStraight."""
-        statements, parts, result = _read(kernel.text)
+    def of(cls, kernel: Kernel, forced: Iterable[int] = ()) -> Straight:
+        """The lines of a plain kernel, whose trace forces the sides of these sites. Raises NotStraight."""
+        statements, parts, result = _read(kernel.text, frozenset(forced))
         calls = _Calls()
         lines = tuple(_line(line) for node in statements for line in calls.before(node))
         return cls(kernel, parts, lines, result)
@@ -174,13 +178,14 @@ def packed(result: Result) -> Iterator[Packed]:
 # Statements
 
 
-def _read(text: str) -> tuple[list[ast.stmt], dict[str, Part], Result]:
+def _read(text: str, forced: frozenset[int] = frozenset()) -> tuple[list[ast.stmt], dict[str, Part], Result]:
     """The statements of a plain kernel that work something out, the parts of arguments, and what is given back."""
     definition = ast.parse(text).body[0]
     assert isinstance(definition, ast.FunctionDef)
     paths: dict[str, tuple[int, ...]] = {arg.arg: (i,) for i, arg in enumerate(definition.args.args[2:])}
     parts: dict[str, Part] = {}
-    statements = [node for node in definition.body[:-1] if not _taken_apart(node, paths, parts)]
+    statements = [node for node in definition.body[:-1]
+                  if not (_taken_apart(node, paths, parts) or _forced(node, forced, parts))]  # fmt: skip
     last = definition.body[-1]
     assert isinstance(last, ast.Return) and last.value is not None
     return statements, parts, _result(last.value)
@@ -206,6 +211,20 @@ def _taken_apart(node: ast.stmt, paths: dict[str, tuple[int, ...]], parts: dict[
     assert isinstance(target, ast.Name)
     parts[target.id] = Part(paths[value.value.id], value.attr, direction)
     return True
+
+
+def _forced(node: ast.stmt, forced: frozenset[int], parts: dict[str, Part]) -> bool:
+    """Whether a statement looks for a side that the trace has: that is noted as a part; or works out how it falls."""
+    match node:
+        case ast.Assign(
+            targets=[ast.Name(id=mask)],
+            value=ast.IfExp(test=ast.Name(id="trace"), body=ast.Call(args=[ast.Constant(value=int() as at)])),
+        ) if at in forced:
+            parts[mask] = Part((at,), SIDE)
+            return True
+        case ast.If(test=ast.Compare(left=ast.Name(id=mask), ops=[ast.Is()])):
+            return mask in parts
+    return False
 
 
 class _Calls(ast.NodeTransformer):
@@ -296,7 +315,7 @@ class _Operations:
     def statement(self, node: ast.stmt) -> None:
         match node:
             case ast.Assign(value=ast.Constant(value=None) | ast.IfExp(test=ast.Name(id="trace"))):
-                pass  # a mask that may be forced: none is, where this runs
+                pass  # a mask that may be forced: this one is not
             case ast.Assign(targets=[ast.Name(id=name)], value=value):
                 self.put(value, name)
             case ast.If(body=[ast.Assign(targets=[ast.Tuple(elts=[ast.Name(id=mask), ast.Name(id=spoiled)])],
