@@ -24,7 +24,8 @@ DRAWN = 600
 NODES = (6, 8, 11, 12, 16, 20)
 POWERS = (-0.7, -0.5, -0.25, 0.25, 0.5, 0.75, 1.5, 2.5, 3.5, 5.5)
 ESTIMATES: dict[str, Estimate] = {
-    "truncation": truncation, "singular": lambda size: truncation(size, True), "analytic": analytic_truncation
+    "truncation": truncation, "singular": lambda size: truncation(size, True),
+    "analytic": lambda size: analytic_truncation(size, size.shape[-1]),
 }  # fmt: skip
 # What a sum of n products may lose to rounding, and what the truth may, both as a part of what is added up.
 ROUNDING = 300 * EPS

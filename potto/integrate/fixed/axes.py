@@ -6,6 +6,7 @@ Owns `Axis` and `Raw`, which the ways to work out a rule (`nodes`, `lowered`) sh
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from msgspec import Struct
@@ -14,13 +15,15 @@ from potto.integrate.columns import distinct
 from potto.integrate.rules.gauss import gauss
 from potto.kernels.cells import Array, Bools
 
+MEAN = (0,)  # the coefficient that is enough where a rule is exact
+
 
 class Axis(Struct, frozen=True):
     """Nodes of a variable on [0, 1].
 
     speeds: how fast they run, as they crowd at turning points, where roots are. transform: (n, rows) from numbers at
-    the nodes to Legendre coefficients, or to the sum alone where that is exact. few, few_speeds: those nodes at which
-    rounding is followed.
+    the nodes to the Legendre coefficients that are asked for, the first of which is the mean. few, few_speeds: those
+    nodes at which rounding is followed.
     """
 
     nodes: Array
@@ -31,12 +34,12 @@ class Axis(Struct, frozen=True):
     few_speeds: Array
 
     @classmethod
-    def of(cls, order: int, exact: bool, turning: tuple[bool, bool], several: bool) -> Axis:
-        """exact: for a polynomial of the degree that the rule is for, at Gauss nodes. turning: whether an end of the
-        stretch is like a square root. several: rounding is followed at few nodes."""
+    def of(cls, order: int, asked: Sequence[int], turning: tuple[bool, bool], several: bool) -> Axis:
+        """asked: the numbers of coefficients. turning: whether an end of the stretch is like a square root. several:
+        rounding is followed at few nodes."""
         rule = gauss(order)
         u = rule.nodes
-        match (False, False) if exact else turning:
+        match turning:
             case (True, True):
                 nodes, speeds = np.sin(0.5 * math.pi * u) ** 2, 0.5 * math.pi * np.sin(math.pi * u)
             case (True, False):
@@ -46,17 +49,17 @@ class Axis(Struct, frozen=True):
             case _:
                 nodes, speeds = u, np.ones_like(u)
         picked = distinct([0, order // 2, order - 1]) if several else np.arange(order)
-        transform = np.ascontiguousarray(rule.weights[:, None] if exact else rule.transform)
+        transform = np.ascontiguousarray(rule.transform[:, asked])
         return cls(nodes, speeds, rule.weights, transform, nodes[picked], speeds[picked])
 
 
 class Raw(Struct, frozen=True):
     """Sums over the nodes of cells, for each of M members.
 
-    number: (1 + k, M), the integrals. coefficients: per variable (1 + k, M, rows), the sizes of Legendre coefficients
-    along it, integrated over the others. most, off: (1 + k, M), what is added up, and what rounding puts it off, by the
-    nodes at which that is followed. clear: (M,) whether no cut comes between, and nothing near by is singular. corners,
-    largest: (M,) the largest value at the ends of stretches, and at nodes.
+    number: (1 + k, M), the integrals. coefficients: per variable (1 + k, M, rows), the sizes of the coefficients asked
+    for along it, integrated over the others. most, off: (1 + k, M), what is added up, and what rounding puts it off, by
+    the nodes at which that is followed. clear: (M,) whether no cut comes between, and nothing near by is singular.
+    corners, largest: (M,) the largest value at the ends of stretches, and at nodes.
     """
 
     number: Array

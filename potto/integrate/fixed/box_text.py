@@ -166,23 +166,13 @@ class BoxText(RuleText):
     def mean(self, i: int, env: dict[str, Symbol], outer: str) -> list[str | None]:
         """The mean values over variable i and those further in. outer: the weight of the node of those further out."""
         at, each, sums = self.at, self.channels, self.sums[i]
-        n, rows, _, nodes, _, weights, transform, _, _ = self.tables[i]
-        self.fill(sums, rows, each)
+        n, rows, _, nodes, _, weights, *_ = self.tables[i]
         j = at.begin(n)
         weight = at.apply("mul", outer, at.constant(weights, j))
         node = at.apply("add", self.low[i], at.apply("mul", self.sizes[i], at.constant(nodes, j)))
         inner = {**env, self.plan.variables[i]: Symbol(node, None, (None,) * (self.k1 - 1), ())}
         values = self.values(inner, weight) if i + 1 == len(self.sizes) else self.mean(i + 1, inner, weight)
-        row = at.begin(rows)
-        factor = at.constant(transform, at.whole("add", at.whole("mul", j, rows), row))
-        base = at.whole("mul", row, each)
-        for c, value in enumerate(values):
-            if value is not None:
-                place = at.at(sums, at.whole("add", base, c))
-                at.store(at.apply("add", at.load(place), at.apply("mul", factor, value)), place)
-        at.end()
-        at.end()
-        moving = [c for c, value in enumerate(values) if value is not None]
+        moving = self.transformed(i, j, values)
         row = at.begin(rows)
         base = at.whole("mul", row, each)
         for c in moving:

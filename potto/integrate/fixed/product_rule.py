@@ -11,16 +11,17 @@ import math
 import numpy as np
 from msgspec import Struct
 
-from potto.integrate.fixed.axes import Axis, Raw
+from potto.integrate.fixed.axes import MEAN, Axis, Raw
 from potto.integrate.fixed.lowered import LoweredCells, lowered_cells
 from potto.integrate.fixed.moving_sums import SUMMED
 from potto.integrate.fixed.nodes import at_once
 from potto.integrate.fixed.straight import Straight
 from potto.integrate.fixed.topologies import Alike
 from potto.integrate.pieces import Evaluator
-from potto.integrate.rules.gauss import analytic_truncation
+from potto.integrate.rules.gauss import analytic_truncation, telling
 from potto.kernels.cells import Array, Bools, Ints, Value
 
+STRAIGHT = (False, False)  # no end of a stretch is like a square root
 # At how many nodes rounding is followed at each; and how much more it may be elsewhere where it is at a few.
 TRACKED, ELSEWHERE = 1 << 12, 2.0
 # How many times larger than at all nodes the integrand may be at the ends of stretches: else something narrow is there.
@@ -61,19 +62,27 @@ class Rule(Struct, frozen=True):
 
     def span(self, env: dict[str, Value]) -> int:
         """How many numbers of a member are kept at a time: those at all nodes, or of coefficients alone."""
-        return self.nodes if self.lowered(env).function(self.machine) is None else sum(self.orders)
+        if self.lowered(env).function(self.machine) is None:
+            return self.nodes
+        return sum(len(asked) for asked in self.asked)
+
+    @property
+    def asked(self) -> list[tuple[int, ...]]:
+        """Which coefficients are asked for along each variable."""
+        return [MEAN if exact else telling(order) for order, exact in zip(self.orders, self.exact, strict=True)]
 
     def applied(self, env: dict[str, Value], index: Ints) -> Measured:
         """The integrals over some of the cells."""
         self.machine.count(index.size * self.nodes)
         several = index.size * self.nodes > TRACKED
-        given = zip(self.orders, self.exact, self.cell.turning, strict=True)
-        axes = [Axis.of(order, exact, turning, several) for order, exact, turning in given]
+        turning = [STRAIGHT if exact else ends for exact, ends in zip(self.exact, self.cell.turning, strict=True)]
+        given = zip(self.orders, self.asked, turning, strict=True)
+        axes = [Axis.of(order, asked, ends, several) for order, asked, ends in given]
         raw = self.raw(env, index, axes)
         truncated = np.zeros(raw.number.shape)
-        for exact, sizes in zip(self.exact, raw.coefficients, strict=True):
+        for order, exact, sizes in zip(self.orders, self.exact, raw.coefficients, strict=True):
             if not exact:
-                truncated += analytic_truncation(sizes)
+                truncated += analytic_truncation(sizes, order)
         clear = raw.clear if all(self.exact) else raw.clear & ~(raw.corners > PEAK * raw.largest)
         truncated[:, ~clear] = np.inf
         gross = np.maximum(raw.most, np.abs(raw.number))

@@ -79,6 +79,7 @@ class RuleText(FormulaText):
         self.tables = [[at.address("%frame", HEAD + PER_AXIS * i + j, "i64" if j < 3 else "ptr")
                         for j in range(PER_AXIS)] for i in range(count)]  # fmt: skip
         self.sums = [at.room(at.whole("mul", table[1], self.channels)) for table in self.tables]
+        self.kept = [at.room(at.whole("mul", table[0], self.channels)) for table in self.tables]
         self.block()
 
     def told(self, values: Sequence[str | None], each: int) -> None:
@@ -109,10 +110,9 @@ class RuleText(FormulaText):
     def every(self, i: int, env: Env, volume: Dual, largest: str) -> Dual:
         """The integral over variable i and those further in. volume: of a node of those further out, with weights."""
         at, k1 = self.at, self.k1
-        n, rows, _, nodes, speeds, weights, transform, _, _ = self.tables[i]
+        n, _, _, nodes, speeds, weights, *_ = self.tables[i]
         low, width, _ = self.stretch(i, env, self.machine)
         volume = self.product(volume, width)
-        self.fill(self.sums[i], rows, k1)
         j = at.begin(n)
         speed, weight = at.constant(speeds, j), at.constant(weights, j)
         inner = {**env, self.plan.variables[i]: self.node(low, width, at.constant(nodes, j))}
@@ -124,18 +124,33 @@ class RuleText(FormulaText):
             share = at.apply("mul", weight, speed)
             value = self.every(i + 1, inner, [self.times(x, share) for x in volume], largest)
         value = [self.times(x, speed) for x in value]
-        row = at.begin(rows)
-        factor = at.constant(transform, at.whole("add", at.whole("mul", j, rows), row))
-        for c, x in enumerate(value):
-            if x is not None:
-                place = at.at(self.sums[i], at.whole("add", at.whole("mul", row, k1), c))
-                at.store(at.apply("add", at.load(place), at.apply("mul", factor, x)), place)
-        at.end()
-        at.end()
-        moving = [c for c in range(k1) if value[c] is not None]
+        moving = self.transformed(i, j, value)
         self.coefficients(i, volume, moving)
         number = [at.load(at.at(self.sums[i], c)) if c in moving else None for c in range(k1)]
         return self.product(number, width)
+
+    def transformed(self, i: int, j: str, values: Sequence[str | None]) -> list[int]:
+        """End the loop over the nodes j of variable i, where these are the values, with the coefficients along it, put
+        where sums are, of those that are not None; which these are."""
+        at = self.at
+        n, rows, _, _, _, _, transform, _, _ = self.tables[i]
+        moving = [c for c, x in enumerate(values) if x is not None]
+
+        def kept(j: str, slot: int) -> str:
+            return at.at(self.kept[i], at.whole("add", at.whole("mul", j, len(moving)), slot))
+
+        for slot, c in enumerate(moving):
+            at.store(values[c] or self.zero, kept(j, slot))
+        at.end()
+        row = at.begin(rows)
+        j, sums = at.adding(n, len(moving))
+        factor = at.constant(transform, at.whole("add", at.whole("mul", j, rows), row))
+        sums = [at.apply("muladd", factor, at.load(kept(j, slot)), x) for slot, x in enumerate(sums)]
+        at.end(*sums)
+        for c, x in zip(moving, sums, strict=True):
+            at.store(x, at.at(self.sums[i], at.whole("add", at.whole("mul", row, self.channels), c)))
+        at.end()
+        return moving
 
     def coefficients(self, i: int, volume: Dual, moving: Sequence[int]) -> None:
         """Add the sizes of the coefficients along variable i, times the volume of the node further out."""

@@ -100,16 +100,26 @@ def _falls(n: int) -> tuple[Array, Array]:
     return ratios, np.log((later - power) / (later + 2 + power)).sum(axis=0)
 
 
-def analytic_truncation(size: Array) -> Array:
+def telling(n: int) -> tuple[int, ...]:
+    """Of the coefficients at n nodes, the mean and those that `analytic_truncation` asks for."""
+    return (0, *range(max(n - 3 * _quarter(n), 1), n))
+
+
+def _quarter(n: int) -> int:
+    return max(n // 4, 2)
+
+
+def analytic_truncation(size: Array, n: int) -> Array:
     """The same for integrands that are known to be analytic beyond the ends of the piece, whose coefficients fall
     geometrically, though not one by one: quarters of them are compared, and the slower decay is followed for AHEAD
     times as many terms as there are nodes, of the n + 1 up to the one by which the integral errs. (How often that is
     exceeded, by which functions: `benchmarks/calibration.py analytic`; at 11 nodes, with quarters of two, it is by
     chance.)
+
+    size: of the last three quarters of the n coefficients at least.
     """
-    n = size.shape[-1]
-    w = max(n // 4, 2)
-    last, before, first = (size[..., n - (i + 1) * w : n - i * w].sum(axis=-1) for i in range(3))
+    w, end = _quarter(n), size.shape[-1]
+    last, before, first = (size[..., end - (i + 1) * w : end - i * w].sum(axis=-1) for i in range(3))
     rate = np.fmin(np.fmax(np.fmax(last / before, np.sqrt(last / first)), 0.0), 1.0) ** (1 / w)
     share = np.fmax(rate ** (AHEAD * n), np.fmin(1.0, (rate * rate - 0.5) / 0.5))
     return 8 * last * share  # type: ignore[no-any-return]

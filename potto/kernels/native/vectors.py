@@ -1,8 +1,9 @@
 """LLVM text for operations on eight numbers at a time.
 
-Owns `Vectors`. Numbers are `<8 x double>`, masks `<8 x i1>`. No operation is marked as one that may be reordered,
-fused or done by reciprocals: what it gives is what numpy gives, bit by bit; functions of the C library are called for
-one number after the other.
+Owns `Vectors`. Numbers are `<8 x double>`, masks `<8 x i1>`. No operation of a kernel is marked as one that may be
+reordered, fused or done by reciprocals: what it gives is what numpy gives, bit by bit; functions of the C library are
+called for one number after the other. Where a rule's products are added up, which numpy does in an order of its own,
+"muladd" rounds once.
 """
 
 from __future__ import annotations
@@ -16,8 +17,8 @@ LANES = 8
 NUMBER, WHOLE, MASK = (f"<{LANES} x {kind}>" for kind in ("double", "i64", "i1"))
 ARITHMETIC = {"add": "fadd", "sub": "fsub", "mul": "fmul", "div": "fdiv"}
 RELATIONS = {"lt": "olt", "le": "ole", "gt": "ogt", "ge": "oge", "eq": "oeq", "ne": "une"}
-INTRINSICS = {"sqrt": 1, "floor": 1, "ceil": 1, "abs": 1, "min": 2, "max": 2}
-_NAMES = {"abs": "fabs", "min": "minimum", "max": "maximum"}
+INTRINSICS = {"sqrt": 1, "floor": 1, "ceil": 1, "abs": 1, "min": 2, "max": 2, "muladd": 3}
+_NAMES = {"abs": "fabs", "min": "minimum", "max": "maximum", "muladd": "fmuladd"}
 OTHERS = {"@llvm.umin.i64": ("i64", "i64, i64"), f"@llvm.vector.reduce.or.v{LANES}i1": ("i1", MASK)}
 LIBRARY = {
     "exp": 1, "log": 1, "log1p": 1, "expm1": 1, "sinh": 1, "cosh": 1, "tanh": 1, "asinh": 1, "acosh": 1, "atanh": 1,
@@ -83,16 +84,29 @@ class Vectors:
         self.depths[f"%j{stem}"] = self.depth
         return f"%j{stem}"
 
-    def end(self) -> None:
-        """End the innermost loop."""
+    def adding(self, count: str, sums: int) -> tuple[str, list[str]]:
+        """Begin a loop, of at least one round, that adds up so many vectors in registers: the round's number, and what
+        they are before it."""
+        j = self.begin(count)
+        names = [f"%c{j[2:]}.{i}" for i in range(sums)]
+        self.depths.update(dict.fromkeys(names, self.depth))
+        return j, names
+
+    def end(self, *sums: str) -> None:
+        """End the innermost loop. sums: what those that it adds up are after a round, and so behind it."""
         stem, count, only = self.loops.pop()
         body = self.bodies.pop()
         self.known.pop()
+        for name in sums:
+            self.depths[name] = self.depth
         self.bodies[-1] += [
             f"  br label %before{stem}", f"before{stem}:",
-            f"  br i1 {only}, label %loop{stem}, label %after{stem}", f"loop{stem}:",
-            f"  %j{stem} = phi i64 [0, %before{stem}], [%next{stem}, %last{stem}]", *body,
-            f"  br label %last{stem}", f"last{stem}:", f"  %next{stem} = add i64 %j{stem}, 1",
+            f"  br label %loop{stem}" if only == "true" else f"  br i1 {only}, label %loop{stem}, label %after{stem}",
+            f"loop{stem}:",
+            f"  %j{stem} = phi i64 [0, %before{stem}], [%next{stem}, %last{stem}]",
+            *(f"  %c{stem}.{i} = phi {NUMBER} [zeroinitializer, %before{stem}], [{name}, %last{stem}]"
+              for i, name in enumerate(sums)),
+            *body, f"  br label %last{stem}", f"last{stem}:", f"  %next{stem} = add i64 %j{stem}, 1",
             f"  %more{stem} = icmp ult i64 %next{stem}, {count}",
             f"  br i1 %more{stem}, label %loop{stem}, label %after{stem}", f"after{stem}:",
         ]  # fmt: skip
