@@ -187,10 +187,13 @@ def beside(problem: Problem, d: int, step: float, here: Sums, rtol: float | None
     """The derivatives on the side of the parameters on which a step is, and how far off they may be, (m, B) each.
 
     here: what there is at the parameters. Where the values beside them lead to another one it is infinite. rtol: see
-    `approached`.
+    `approached`. Not known where far more than the budget is spent: each look costs some nodes whatever is left.
     """
 
     def at(h: float) -> Parts:
+        if problem.machine.overdrawn():
+            unknown, slope = np.full_like(here.v, np.nan), np.full_like(here.t[:, d], np.nan)
+            return unknown, np.full_like(here.e, np.inf), slope, np.full_like(here.et[:, d], np.inf)
         part = problem.beside({n: moved(v, h, d) for n, v in problem.env.items()})
         return part.v, part.e, part.t[:, d], part.et[:, d]
 

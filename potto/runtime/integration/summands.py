@@ -8,6 +8,7 @@ are not accurate, that they have two derivatives) are evaluated as they are writ
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import nullcontext
 from typing import Any
 
 import numpy as np
@@ -66,8 +67,10 @@ def added(machine: Machine, terms: tuple[Term, ...], env: dict[str, Value]) -> V
 
 
 def _single(machine: Machine, term: Term, env: dict[str, Value]) -> Value:
-    here = {name: env[name] for name in term.free}
-    return machine.integral(term, here) if isinstance(term, Integral) else machine.term(term, here)
+    """A summand as it is written; a whole answer's with a budget of its own, as those have that run as one batch."""
+    here, record = {name: env[name] for name in term.free}, machine.record
+    with record.among(record.members) if machine.root else nullcontext():
+        return machine.integral(term, here) if isinstance(term, Integral) else machine.term(term, here)
 
 
 def _grouped(machine: Machine, terms: tuple[Term, ...], env: dict[str, Value]) -> Grouped:
