@@ -1,5 +1,5 @@
 """Every feature all along every example, also when the text is broken: an answer or none, never an exception, and
-nothing outside of it. `make fuzz` asks at every offset, `make test` at every eleventh."""
+nothing outside of it. `make fuzz` asks at every offset, `make test` here and there."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ def ask_about_file(library: Library, file: str, text: str, whole: Span) -> None:
 @pytest.mark.parametrize("name", FILES)
 def test_every_feature_here_and_there(name: str) -> None:
     library, file, text = opened(name)
-    ask_everything(library, file, text, range(0, len(text) + 1, examples(31, 12)))
+    ask_everything(library, file, text, range(0, len(text) + 1, examples(71, 12)))
 
 
 @pytest.mark.slow
@@ -109,7 +109,7 @@ def test_every_feature_all_along(name: str) -> None:
     """Those that look through the workspace, and every action and proposal resolved; the others as well where there is
     time to ask them everywhere."""
     library, file, text = opened(name)
-    offsets = range(0, len(text) + 1, examples(29, 1))
+    offsets = range(0, len(text) + 1, examples(83, 1))
     if LOOKING:
         ask_everything(library, file, text, offsets)
     db = library.db
@@ -159,7 +159,7 @@ def test_every_feature_on_broken_text(seed: int) -> None:
     name = FILES[seed]
     original = (EXAMPLES / name).read_text(encoding="utf-8")
     library, file, text = opened(name, mutated(original, rng))
-    ask_everything(library, file, text, sorted(rng.sample(range(len(text) + 1), min(40, len(text) + 1))))
+    ask_everything(library, file, text, sorted(rng.sample(range(len(text) + 1), min(examples(20, 40), len(text) + 1))))
 
 
 @pytest.mark.slow
