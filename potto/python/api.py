@@ -137,9 +137,15 @@ class Module(Travelling):
     def __getattr__(self, name: str) -> Any:
         if name.startswith("__"):
             raise AttributeError(name)
+        known: Function | None = self._world.memory.get((Module, self._file, name))
+        if known is not None:
+            return known
         target = resolve(self._world.db, self._file, name)
         if isinstance(target, DefinitionTarget):
-            return _member(self._world, self._file, nodes.Name(NOWHERE, name))
+            found = _member(self._world, self._file, nodes.Name(NOWHERE, name))
+            if isinstance(found, Function):  # which knows what its calls have told: the same one while its texts stay
+                self._world.memory[Module, self._file, name] = found
+            return found
         if isinstance(target, ModuleTarget):
             return Module(self._world, target.file)
         near = difflib.get_close_matches(name, names(self._world.db, self._file), 1)

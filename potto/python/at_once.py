@@ -94,17 +94,17 @@ class AtOnce(Struct, frozen=True, eq=False):
         every: Any = None
         if axes:
             number, error, every = with_axes(number, axes), with_axes(error, axes), with_axes((True,), axes)[0]
-        first: tuple[Any, ...] = (None, None)
-        rest: tuple[Any, ...] = ()
-        if self.dual:
-            first = number[1], error[1]
-        elif self.wrt:
-            one = len(self.wrt) == 1
-            first = (number[1], error[1]) if one else (tuple(number[1:]), tuple(error[1:]))
-            rest = (self.wrt,)
-        seconds = time.perf_counter() - start
-        return self.made(number[0], error[0], *first, True, found.nodes, seconds, 0.0, "quadrature", (),
-                         dict(self.stats), None, every, {}, *rest)  # fmt: skip
+        more: dict[str, Any] = {}
+        if self.dual or self.wrt:
+            one = self.dual or len(self.wrt) == 1
+            tangent, off = (number[1], error[1]) if one else (tuple(number[1:]), tuple(error[1:]))
+            more = {"tangent": tangent, "tangent_error": off}
+        if self.wrt and not self.dual:
+            more["wrt"] = self.wrt
+        return self.made(
+            number[0], error[0], evals=found.nodes, seconds=time.perf_counter() - start, method="quadrature",
+            stats=dict(self.stats), member_converged=every, **more,
+        )  # fmt: skip
 
     def _env(self, args: tuple[Any, ...]) -> dict[str, Cell] | None:
         """The numbers as the integral takes them; None where one is of another kind than those of before."""

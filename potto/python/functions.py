@@ -56,7 +56,14 @@ NOTHING: Mapping[str, Any] = MappingProxyType({})
 def deriv(function: Function) -> Function:
     """The derivative: a function of duals `(value, tangent)`, which gives a dual."""
     must_be_function(function)
-    return Function(function._world, function._file, _call_of("deriv", function._expr), derivative_type(function._type))
+    if function._derivative is None:  # the same one each time: it knows what its calls have told
+        world, file, type = function._world, function._file, derivative_type(function._type)
+        if function._given:  # of what is left, so it is derived as a whole
+            expr, _ = world.typed(file, rf"\(f : {function.type}) . deriv(f)")
+            function._derivative = Function(world, file, expr, type, (((function,), {}),))
+        else:
+            function._derivative = Function(world, file, _call_of("deriv", function._expr), type)
+    return function._derivative
 
 
 def must_be_function(function: object) -> None:
@@ -85,6 +92,7 @@ class Function(Travelling):
         self._known: tuple[int, Value] | None = None
         self._derives: tuple[int, bool] | None = None
         self._groups: tuple[int, tuple[tuple[Parameter, ...], ...]] | None = None
+        self._derivative: Function | None = None
 
     def __call__(self, *args: Any, **kwargs: Any) -> Any:
         known = None if kwargs else self.at_once(args)

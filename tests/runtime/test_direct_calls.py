@@ -14,7 +14,6 @@ import pytest
 
 import potto
 from potto.kernels.making import counts
-from potto.python.at_once import AtOnce
 from potto.python.calls import Call
 from potto.runtime.evaluate import Program
 
@@ -122,13 +121,17 @@ def test_calls_near_those_of_before_are_answered_the_same(
     ]
 
     def told(found: potto.Estimate) -> tuple[object, ...]:
-        return (type(found), repr((found.value, found.error, found.tangent, found.tangent_error)), found.method,
-                found.converged, repr(found.member_converged), list(map(str, found.notes)), found.evals)  # fmt: skip
+        return (type(found), np.shape(found.value), np.shape(found.tangent), found.method, found.converged,
+                repr(found.member_converged), list(map(str, found.notes)), found.text, found.shortfalls)  # fmt: skip
 
-    answer, answered = AtOnce.answer, []
+    def numbers(found: potto.Estimate) -> tuple[Any, Any]:
+        pairs = (found.value, found.error), (found.tangent, found.tangent_error)
+        return tuple(np.hstack([np.ravel(x) for x in part if x is not None]) for part in zip(*pairs, strict=True))
 
-    def spied(self: AtOnce, *given: Any) -> potto.Estimate | None:
-        found = answer(self, *given)
+    at_once, answered = Call.at_once, []
+
+    def spied(self: Call, *given: Any) -> potto.Estimate | None:
+        found = at_once(self, *given)
         answered.append(found is not None)
         return found
 
@@ -137,11 +140,17 @@ def test_calls_near_those_of_before_are_answered_the_same(
             for c in given:
                 call(c)
             with monkeypatch.context() as patch:
-                patch.setattr(AtOnce, "answer", spied)
-                found = [told(call(c)) for c in given[: len(places)]]
+                patch.setattr(Call, "at_once", spied)
+                found = [call(c) for c in given[: len(places)]]
             with monkeypatch.context() as patch:
                 patch.setattr(Call, "at_once", lambda *_: None)
-                assert found == [told(call(c)) for c in given[: len(places)]]
+                general = [call(c) for c in given[: len(places)]]
+            for ours, theirs in zip(found, general, strict=True):
+                assert told(ours) == told(theirs)
+                (v, e), (w, f) = numbers(ours), numbers(theirs)
+                # How many nodes are enough is proved for regions, and these are larger where several calls lie in one:
+                # two rules, each within its own bound of the same truth.
+                assert ((np.abs(v - w) <= e + f) | (v == w) | (np.isnan(v) & np.isnan(w))).all()
     assert sum(answered) >= 25 and not all(answered)
 
 
