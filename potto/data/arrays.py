@@ -1,7 +1,7 @@
 """Numpy's files: one array (NPY), or a zip file of several (NPZ).
 
 Owns `array_head`, `table_head` for shapes, read from the heads without numpy, and `array_file`, `table_file` for
-values. Nothing is unpickled.
+values. An NPY file whose elements have named parts is a table of these. Nothing is unpickled.
 """
 
 from __future__ import annotations
@@ -32,10 +32,22 @@ _SAVE_MANY = "save arrays of real numbers by their names: `numpy.savez(path, x=x
 _T = TypeVar("_T")
 
 
+class _Part(Struct, frozen=True):
+    """What each element holds under a name, or without one: numbers of a type, so many in each direction."""
+
+    name: str
+    dtype: str
+    dimensions: tuple[int, ...] = ()
+
+    @property
+    def bytes(self) -> int:
+        return prod(self.dimensions) * int(self.dtype.lstrip("<>|=")[1:])
+
+
 class _Head(Struct, frozen=True):
     """What the head of an array says, and where its numbers start."""
 
-    dtype: str
+    parts: tuple[_Part, ...]
     fortran: bool
     dimensions: tuple[int, ...]
     start: int
@@ -43,17 +55,30 @@ class _Head(Struct, frozen=True):
     @property
     def end(self) -> int:
         """How many bytes the array has, its head included."""
-        return self.start + prod(self.dimensions) * int(self.dtype.lstrip("<>|=")[1:])
+        return self.start + prod(self.dimensions) * sum(part.bytes for part in self.parts)
+
+    @property
+    def named(self) -> bool:
+        return bool(self.parts[0].name)
 
 
-def array_head(content: bytes) -> Number | Sizes:
+def array_head(content: bytes) -> Number | Sizes | Columns:
     """The shape of an NPY file."""
-    return _shape(_checked(content, len(content)))
+    head = _checked(content, len(content))
+    if not head.named:
+        return _shape(head.dimensions)
+    names = identifiers([part.name for part in head.parts])
+    shapes = (_shape((*head.dimensions, *part.dimensions)) for part in head.parts)
+    return Columns(tuple(zip(names, shapes)))
 
 
-def array_file(content: bytes) -> float | Array:
+def array_file(content: bytes) -> float | Array | Table:
     """The value of an NPY file."""
-    return _array(content)
+    head = _checked(content, len(content))
+    if not head.named:
+        return _array(head, content)
+    names = identifiers([part.name for part in head.parts])
+    return Table(tuple((name, _array(head, content, part.name)) for name, part in zip(names, head.parts)))
 
 
 def table_head(content: bytes) -> Columns:
@@ -61,14 +86,25 @@ def table_head(content: bytes) -> Columns:
 
     def head(archive: ZipFile, entry: ZipInfo) -> Number | Sizes:
         with archive.open(entry) as file:
-            return _shape(_checked(file.read(_LONGEST + 12), entry.file_size))
+            return _shape(_without_names(_checked(file.read(_LONGEST + 12), entry.file_size)).dimensions)
 
     return Columns(tuple(_entries(content, head)))
 
 
 def table_file(content: bytes) -> Table:
     """The value of an NPZ file."""
-    return Table(tuple(_entries(content, lambda archive, entry: _array(archive.read(entry)))))
+
+    def value(archive: ZipFile, entry: ZipInfo) -> float | Array:
+        found = archive.read(entry)
+        return _array(_without_names(_checked(found, len(found))), found)
+
+    return Table(tuple(_entries(content, value)))
+
+
+def _without_names(head: _Head) -> _Head:
+    if head.named:
+        raise malformed(f"the array holds {_ODD['V']}, not real numbers", hint=_SAVE_MANY)
+    return head
 
 
 def _entries(content: bytes, read: Callable[[ZipFile, ZipInfo], _T]) -> Iterator[tuple[str, _T]]:
@@ -146,7 +182,23 @@ def _head(content: bytes) -> _Head:
         raise broken
     if len(content) < start or type(fortran) is not bool:
         raise broken
-    return _Head(_real(dtype), fortran, dimensions, start)
+    return _Head(_parts(dtype), fortran, dimensions, start)
+
+
+def _parts(dtype: object) -> tuple[_Part, ...]:
+    """What the elements are made of, if that is real numbers."""
+    if not isinstance(dtype, list) or not dtype:
+        return (_Part("", _real(dtype)),)
+    found = []
+    for name, kind, *shape in dtype:
+        dimensions = shape[0] if shape else ()
+        if not isinstance(name, str) or not name or not isinstance(dimensions, tuple):
+            raise malformed(f"the array holds {_ODD['V']} whose parts have no names", hint=_SAVE)
+        try:
+            found.append(_Part(name, _real(kind), dimensions))
+        except Refused as refused:
+            raise _within(name, refused) from None
+    return tuple(found)
 
 
 def _real(dtype: object) -> str:
@@ -165,26 +217,30 @@ def _pickled() -> Refused:
     return malformed(message, found="pickle", hint=_SAVE)
 
 
-def _shape(head: _Head) -> Number | Sizes:
-    return Sizes(head.dimensions) if head.dimensions else Number()
+def _shape(dimensions: tuple[int, ...]) -> Number | Sizes:
+    return Sizes(dimensions) if dimensions else Number()
 
 
-def _array(content: bytes) -> float | Array:
+def _array(head: _Head, content: bytes, name: str = "") -> float | Array:
+    """The numbers of a file, or those that its elements hold under a name."""
     import numpy as np
 
-    head = _checked(content, len(content))
     try:
-        dtype = np.dtype(head.dtype)
+        dtypes = [np.dtype((part.dtype, part.dimensions)) for part in head.parts]
     except TypeError:
-        raise malformed(f"numbers of the type {head.dtype} are not known on this machine", hint=_SAVE) from None
+        kinds = ", ".join(part.dtype for part in head.parts)
+        raise malformed(f"numbers of the type {kinds} are not known on this machine", hint=_SAVE) from None
+    dtype = np.dtype([(part.name, own) for part, own in zip(head.parts, dtypes)]) if head.named else dtypes[0]
     read = np.frombuffer(content, dtype, prod(head.dimensions), head.start)
     with np.errstate(over="ignore", invalid="ignore"):
         shaped = read.reshape(head.dimensions, order="F" if head.fortran else "C")
+        shaped = shaped[name] if name else shaped
         found = np.require(shaped, np.float64, ["C", "A"])  # heads of files need not leave the numbers aligned
     if not np.isfinite(found).all():
-        at = np.argwhere(~np.isfinite(found.reshape(head.dimensions)))[0].tolist() if head.dimensions else []
-        raise _infinite(tuple(at), str(found.reshape(head.dimensions)[tuple(at)]))
-    return Array(head.dimensions, Number(), found) if head.dimensions else float(found.reshape(()))
+        at = np.argwhere(~np.isfinite(found.reshape(shaped.shape)))[0].tolist() if shaped.shape else []
+        refused = _infinite(tuple(at), str(found.reshape(shaped.shape)[tuple(at)]))
+        raise _within(name, refused) if name else refused
+    return Array(shaped.shape, Number(), found) if shaped.shape else float(found.reshape(()))
 
 
 def _infinite(at: tuple[int, ...], found: str) -> Refused:

@@ -139,12 +139,28 @@ def describe(stop: Stop, edits: list[Edit]) -> Diagnostic:
     return _unexpected(stop)
 
 
+def _goes_through(stop: Stop) -> bool:
+    """Whether it stopped in an array, behind its `for x in xs`."""
+    inside: list[list[str]] = []  # of each open bracket: itself, and that `for` if it has been
+    for token in stop.tokens[: stop.index]:
+        if token.text in ("(", "["):
+            inside.append([token.text])
+        elif token.text in (")", "]") and inside:
+            inside.pop()
+        elif token.kind == "FOR" and inside:
+            inside[-1].append(token.text)
+    return bool(inside) and inside[-1][0] == "[" and len(inside[-1]) > 1
+
+
 def _special(stop: Stop) -> Diagnostic | None:
     """Stops whose cause shows without the repair."""
     opened, at, before = stop.opened, stop.at, stop.before
     if at.kind == "COMMA" and opened is not None and opened.kind == "LET":
         return kinds.UNEXPECTED(at.span, "unexpected `,`", help="separate the names of a `let` by `;`, or by lines")
-    if at.kind == "COLON" and opened is not None and opened.kind == "ADJACENT":
+    if at.kind == "IF" and _goes_through(stop):
+        help = "let what is not meant count nothing: `sum x in xs (if x > 0 then x else 0)`"
+        return kinds.UNEXPECTED(at.span, "an array has no filter: its size is known before its elements", help=help)
+    if at.kind in ("COLON", "DOTDOT") and opened is not None and opened.kind == "ADJACENT":
         help = "write the elements that are meant: `[xs[k] for k in 1..3]`"
         return kinds.UNEXPECTED(at.span, "an index is one place, not a range", help=help)
     unpacked = tuple_without_parentheses(stop)

@@ -99,7 +99,6 @@ def test_nothing_is_unpickled() -> None:
         (np.array([b"a"]), "the array holds texts, not real numbers"),
         (np.zeros(2, "M8[s]"), "the array holds dates, not real numbers"),
         (np.zeros(2, "m8[s]"), "the array holds durations, not real numbers"),
-        (np.zeros(2, [("x", float)]), "the array holds records, not real numbers"),
         (np.zeros(2, "V3"), "the array holds records, not real numbers"),
         (np.zeros((2, 0)), "the array holds no values: its shape is (2, 0)"),
     ],
@@ -164,3 +163,18 @@ def test_other_files_in_an_archive() -> None:
     with zipfile.ZipFile(file, "w") as archive:
         archive.writestr("notes.txt", "hello")
     assert mistake("a.npz", file.getvalue()).message == "`notes.txt` within the file is not an array"
+
+
+def test_elements_with_names_are_a_table() -> None:
+    """Part by part, whatever the kinds, also where each part is several numbers."""
+    array = np.array([(1, [2.5, 3.0]), (4, [5.0, 6.0])], [("x", "i2"), ("at 0", "<f4", (2,))])
+    content = saved(array)
+    assert shape_of(Path("a.npy"), content) == Columns((("x", Sizes((2,))), ("at_0", Sizes((2, 2)))))
+    found = values_of(Path("a.npy"), content)
+    assert isinstance(found, Table)
+    assert [found[name].values.tolist() for name in ("x", "at_0")] == [[1, 4], [[2.5, 3], [5, 6]]]
+    array["at 0"][1, 0] = np.nan
+    wrong = mistake("a.npy", saved(array))
+    assert (wrong.row, wrong.column, wrong.message) == (2, 1, "`at 0`: row 2, column 1: nan is not finite")
+    assert mistake("a.npy", saved(np.zeros(2, [("x", complex)]))).message.startswith("`x`: the array holds complex")
+    assert mistake("a.npz", many(x=array)).message == "`x`: the array holds records, not real numbers"

@@ -35,6 +35,11 @@ def test_objects_are_columns(data: dict[str, Any]) -> None:
     assert found == data and list(found) == list(data)
 
 
+@given(st.integers(1, 3), st.dictionaries(st.sampled_from("abc"), boxes, min_size=1))
+def test_objects_in_a_list_are_rows(count: int, row: dict[str, Any]) -> None:
+    assert plain("d.json", json.dumps([row] * count)) == {name: [entry] * count for name, entry in row.items()}
+
+
 @given(
     st.recursive(
         st.one_of(numbers, st.none(), st.booleans(), st.text(max_size=2)),
@@ -61,7 +66,10 @@ def test_any_json_is_answered(data: Any) -> None:  # fmt: skip
         ('[1, "x, ]"]', "P0803", 1, 2, "line 1, `[1]`: `x, ]` is a text, not a number"),
         ("[true]", "P0803", 1, 1, "line 1, `[0]`: this is true or false, not a number"),
         ('{"x": 1,\n"y": null}', "P0803", 2, None, "line 2, `y`: this is null, not a number"),
-        ('[{"x": 1}]', "P0803", 1, 1, "line 1, `[0]`: this is an object, not a number"),
+        ('[{"x": 1},\n{"x": null}]', "P0803", 2, 2, "line 2, `[1].x`: this is null, not a number"),
+        ('[{"x": 1},\n{"y": 2}]', "P0803", 2, 2, "line 2, `[1]`: the object has `y`, and the first one `x`"),
+        ('[{"x": 1},\n7]', "P0803", 2, 2, "line 2, `[1]`: this stands among objects"),
+        ("[{}]", "P0805", None, None, "the file holds no values: its objects are empty"),
         ('{"x": {"y": 1}}', "P0803", 1, None, "line 1, `x`: this is an object, not a number"),
         ('{"x": [1], "y": [[]]}', "P0803", 1, 1, "line 1, `y[0]`: the list is empty"),
         ("[]", "P0803", 1, None, "line 1: the list is empty"),

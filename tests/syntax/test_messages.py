@@ -364,4 +364,8 @@ def test_arrays_and_folds() -> None:
         #                          ^ error[P0104]: expected the step of `fold` in parentheses
         x = xs[0:2]
         #       ^ error[P0103]: an index is one place, not a range
+        x = xs[0..2]
+        #       ^^ error[P0103]: an index is one place, not a range
+        x = [2*y for y in [1, 2] if y > 1]
+        #                        ^^ error[P0103]: an array has no filter: its size is known before its elements
     """)

@@ -146,7 +146,7 @@ def _places(place: Number, size: int) -> Any:
         message = f"the index {first} is out of range: the array has {size} element{'s' if size > 1 else ''}"
         if not size:
             message = f"this array or range is empty: it has no element {first}"
-            last = "an empty array or range has neither a least nor a greatest element, as in `min x in xs (x)`"
+            last = "neither an index nor `min x in xs (x)` or `max` has anything to take there"
         raise PottoError([OUT_OF_RANGE(errors.NOWHERE, message, notes=(last,))])
     return at.astype(np.int64)
 

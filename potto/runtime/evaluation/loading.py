@@ -11,8 +11,10 @@ from potto.core.terms import Data
 from potto.data.files import digest, read, values_of
 from potto.data.mistakes import DataMistake
 from potto.data.values import Array, Row, Table
+from potto.diagnostics import PottoError
 from potto.kernels import errors
 from potto.kernels.cells import Cell, Rows, Value
+from potto.types.loading import KINDS
 
 
 def loaded(term: Data) -> Value:
@@ -20,18 +22,23 @@ def loaded(term: Data) -> Value:
     path = Path(term.path)
     content = read(path)
     if isinstance(content, DataMistake):
-        raise errors.wrong_call(f"{path.name}: {content.message}", content.hint)
+        raise _wrong(path, content)
     if digest(content) != term.content:
         raise errors.wrong_call(f"{path.name} has changed while the program ran", "evaluate again")
     found = values_of(path, content)
     if isinstance(found, DataMistake):
-        raise errors.wrong_call(f"{path.name}: {found.message}", found.hint)
+        raise _wrong(path, found)
     if isinstance(found, Table) and term.column:
         found = found[term.column]
     if isinstance(found, Array):
         return _rows(found)
     assert isinstance(found, float)
     return Cell(found)
+
+
+def _wrong(path: Path, mistake: DataMistake) -> PottoError:
+    """What only a file's values show: their heads are what is checked."""
+    return PottoError([KINDS[mistake.code](errors.NOWHERE, f"{path.name}: {mistake.message}", help=mistake.hint)])
 
 
 def _rows(array: Array) -> Value:
