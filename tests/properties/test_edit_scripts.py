@@ -21,7 +21,7 @@ from potto.modules.texts import content
 from potto.types import interface
 
 ROOT = "/edited"
-SCRIPTS = examples(50, 500)
+SCRIPTS = examples(30, 500)
 
 
 def seen(lib: Library, offsets: dict[str, list[int]]) -> dict[Hashable, Any]:

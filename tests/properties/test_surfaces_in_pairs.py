@@ -56,13 +56,13 @@ def conics(number: int) -> bool:
     return compared(scene.source, t, Answer(value, slope, value_error, slope_error))
 
 
-@settings(max_examples=examples(40), suppress_health_check=list(HealthCheck))
+@settings(max_examples=examples(25), suppress_health_check=list(HealthCheck))
 @given(st.integers(0, 10**6))
 def test_periodic_and_searched_sections_beside_others(number: int) -> None:
     periodic_or_searched(number)
 
 
-@settings(max_examples=examples(40), suppress_health_check=list(HealthCheck))
+@settings(max_examples=examples(25), suppress_health_check=list(HealthCheck))
 @given(st.integers(0, 10**6))
 def test_two_conics(number: int) -> None:
     conics(number)
