@@ -57,7 +57,7 @@ class Kind(Struct, frozen=True):
 
 
 class Report(Struct, frozen=True):
-    """What is kept. folder: None if the store is turned off; complaint: why it is not used although it is on."""
+    """What is kept. folder: None if the store is turned off; complaint: why nothing is kept although it is on."""
 
     folder: Path | None
     kinds: tuple[Kind, ...]
@@ -151,7 +151,7 @@ def report() -> Report:
     for kind, _, status in _entries(folder):
         sizes.setdefault(kind, []).append(status.st_size)
     kinds = tuple(Kind(kind, len(found), sum(found)) for kind, found in sorted(sizes.items()))
-    return Report(base, kinds, bound(), complaint())
+    return Report(base, kinds, bound(), complaint() or _not_written(folder))
 
 
 def clear() -> None:
@@ -241,6 +241,13 @@ def _entries(folder: str) -> Iterator[tuple[str, str, os.stat_result]]:
                     yield kind, entry.path, entry.stat(follow_symlinks=False)
 
 
+def _within(folder: str) -> list[tuple[str, os.stat_result]]:
+    """The folders of kinds, and what stands for one."""
+    with suppress(OSError), os.scandir(folder) as kinds:
+        return [(kind.path, kind.stat()) for kind in kinds if _KIND.fullmatch(kind.name) and kind.is_dir()]
+    return []
+
+
 def _listed(folder: str) -> Iterator[tuple[str, list[os.DirEntry[str]]]]:
     """The folders of kinds, each with what is in it."""
     with suppress(OSError), os.scandir(folder) as kinds:
@@ -322,14 +329,21 @@ def _judged(folder: str) -> tuple[str | None, str | None]:
     return None, f"nothing is kept between runs: others can write to {others}; {advice}, or set POTTO_CACHE=off"
 
 
+def _not_written(folder: str) -> str | None:
+    """A sentence for who asks, where there is nothing wrong with a folder but that it cannot be written."""
+    if os.access(folder, os.W_OK):
+        return None
+    return f"nothing is kept between runs: {folder} cannot be made or written"
+
+
 def _open_to_others(folder: str) -> str | None:
-    """The folder, of this one and those around it, by which somebody else could put something into this one.
+    """The folder, of this one, those in it and those around it, by which somebody else could put something into it.
 
     Around it, what others can write must be sticky, as /tmp is; its group is the user alone on most systems.
     """
-    status = os.stat(folder)
-    if status.st_uid != os.getuid() or status.st_mode & 0o022:
-        return folder
+    for path, status in ((folder, os.stat(folder)), *_within(folder)):
+        if status.st_uid != os.getuid() or status.st_mode & 0o022:
+            return path
     around = os.path.realpath(folder)
     while (parent := os.path.dirname(around)) != around:
         around = parent

@@ -44,6 +44,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
     for name, (n, b) in {**kinds, "in all": (count, size)}.items():
         console.answer(f"  {name:<14} {n:>7,} file{' ' if n == 1 else 's'} {b / 1e6:>10,.3f} MB")
     console.answer(f"at most {report.bound / 1e6:,.0f} MB beside verdicts  (POTTO_CACHE_MB)")
+    if report.complaint and store.refused() is None:  # which is told of every command
+        console.answer(report.complaint)
     if options.clear:
         console.answer("cleared")
     return 0

@@ -7,6 +7,7 @@ import stat
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import given
@@ -162,6 +163,20 @@ class TestFolder:
         said = store.complaint()
         assert said is not None and "others can write" in said and f"chmod go-w {folder / 'store'}" in said
         assert store.report().complaint == said
+
+    @posix
+    def test_others_can_write_to_a_folder_in_it(self, folder: Path) -> None:
+        store.put("text", b"a", b"1")
+        (folder / "store" / "text").chmod(0o777)
+        store._judged.cache_clear()
+        assert store.get("text", b"a") is None
+        assert f"chmod go-w {folder / 'store' / 'text'}" in str(store.complaint())
+
+    def test_who_asks_is_told_of_a_folder_that_cannot_be_made(self, tmp_path: Path, monkeypatch: Any) -> None:
+        (tmp_path / "file").write_text("")
+        monkeypatch.setenv("POTTO_CACHE", str(tmp_path / "file"))
+        assert store.complaint() is None
+        assert "cannot be made or written" in str(store.report().complaint)
 
     @posix
     def test_others_can_replace_it(self, tmp_path: Path, folder: Path) -> None:
