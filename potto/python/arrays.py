@@ -82,6 +82,7 @@ def _array(name: str, argument: Any, type: ArrayOf, sizes: Sizes) -> Any:
         with contextlib.suppress(TypeError, ValueError):  # of answers, or not of one shape
             axes = axes_of(type) or 0
             numbers = np.array(argument, dtype=float) if argument else np.zeros(_without_elements(type))
+            _must_be_there(name, argument, numbers)
             argument = numbers if numbers.ndim <= axes else argument  # else of elements that are batches
     if isinstance(argument, np.ndarray):
         return _numpy(name, argument, type, sizes)
@@ -107,6 +108,17 @@ def _of_table(name: str, table: Any) -> Any:
     more = f", and {len(gaps) - 1} more are missing" if len(gaps) > 1 else ""
     help = "leave such rows out, `table.dropna()`, or fill them in, `table.fillna(…)`"
     raise wrong_call(f"`{name}` has no value in {where}{more}", help)
+
+
+def _must_be_there(name: str, argument: list[Any], numbers: np.ndarray[Any, Any]) -> None:
+    """Raise PottoError for None in a list: numpy makes nan of it, as of a number that is none."""
+    if not np.isnan(numbers).any():
+        return
+    items = np.array(argument, dtype=object)
+    gap = next((place for place, item in np.ndenumerate(items) if item is None), None)
+    if gap is not None:
+        where = ", ".join(map(str, gap))
+        raise wrong_call(f"`{name}[{where}]` has no value: it is None", "leave it out, or fill it in")
 
 
 def _may_have_gaps(numbers: Any) -> bool:
@@ -158,7 +170,10 @@ def _of_numbers(type: Type) -> bool:
 
 def _numpy(name: str, argument: np.ndarray[Any, Any], type: ArrayOf, sizes: Sizes) -> Value:
     if argument.dtype.kind not in "fiu":
-        raise wrong_call(f"`{name}` is {format_type(type)}: an array must hold real numbers, not {argument.dtype}")
+        help = "truths are made 0 and 1 by `.astype(float)`" if argument.dtype.kind == "b" else ""
+        raise wrong_call(
+            f"`{name}` is {format_type(type)}: an array must hold real numbers, not {argument.dtype}", help
+        )
     axes = axes_of(type)
     if axes is None:
         raise wrong_call(f"`{name}` is {format_type(type)}: give it as a list")

@@ -30,6 +30,7 @@ from potto.syntax.nodes import (
     Tuple,
     TypeExpr,
     Unary,
+    With,
 )
 from potto.syntax.suggesting import write
 from potto.syntax.tokens import Token
@@ -111,7 +112,9 @@ def as_expr(context: Context, value: Any) -> Expr:
         return suffixed(as_expr(context, value.group), value.suffixes)
     if not isinstance(value, Group):
         return value  # type: ignore[no-any-return]
-    items = [plain(context, written) for written in value.written]
+    items = list[Expr]()
+    for written in value.written:
+        items.append(plain(context, written, items[-1] if items else None))
     if not items and value.virtual:
         return ErrorExpr(value.span, "")
     if not items:
@@ -122,8 +125,8 @@ def as_expr(context: Context, value: Any) -> Expr:
     return Tuple(value.span, tuple(items))
 
 
-def plain(context: Context, written: Written) -> Expr:
-    """A thing between commas where only an expression has a meaning."""
+def plain(context: Context, written: Written, before: Expr | None = None) -> Expr:
+    """A thing between commas where only an expression has a meaning. before: the one before it, if that matters."""
     if written.separator == ";":
         _semicolon(context, written)
     if written.name is None:
@@ -136,14 +139,13 @@ def plain(context: Context, written: Written) -> Expr:
         )
         return target
     span = target.span.cover(written.value.span)
-    context.report(
-        kinds.EQUALS(
-            span,
-            f"`{target.id} = …` names an argument, but this is not a call",
-            help=f"to compare, write `{target.id} == …`",
-            suggestions=(suggest(Span(target.span.end, written.value.span.start), " == ", "Write `==`"),),
-        )
-    )
+    message = f"`{target.id} = …` names an argument, but this is not a call"
+    help = f"to compare, write `{target.id} == …`"
+    suggestions = [suggest(Span(target.span.end, written.value.span.start), " == ", "Write `==`")]
+    if isinstance(before, With):
+        message, suggestions = f"`{target.id} = …` stands behind a `with` of one field", []
+        help = f"several fields stand in parentheses: `c with (…, {target.id} = …)`"
+    context.report(kinds.EQUALS(span, message, help=help, suggestions=tuple(suggestions)))
     op = Operand("==", Span(target.span.end, target.span.end), written.value)
     return Compare(span, target, (op,))
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import pickle
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -345,6 +347,26 @@ def test_records_in_an_array_are_dicts_or_columns_and_so_are_slopes_by_them() ->
     assert told.value.diagnostics[0].help == "did you mean `r`?"
     with pytest.raises(potto.PottoError, match="has 2 elements"):
         module.flat({"x": [1.0, 2.0], "r": [1.0]}, 0.5)
+
+
+def test_none_in_a_list_is_told() -> None:
+    module = potto.compile("def f(xs: [n] Real, k) k*(sum x in xs (x))\ndef g(a: [n, m] Real) a[0, 0]")
+    with pytest.raises(potto.PottoError, match=r"`xs\[1\]` has no value: it is None"):
+        module.f([1.0, None], 3.0)
+    with pytest.raises(potto.PottoError, match=r"`a\[1, 0\]` has no value"):
+        module.g([[1.0, 2.0], [None, 3.0]])
+    assert np.isnan(module.f([1.0, np.nan], 3.0).value)
+
+
+def test_fields_of_an_answer_are_answers() -> None:
+    module = potto.compile("record Eye(at: (Real, Real), focal: Real)\ndef eye(t) Eye(at=(t, 2*t), focal=exp(t))")
+    found = module.eye(1.0)
+    assert found.focal.value == math.e and found.focal.error == found[1].error and found.at[1].value == 2
+    assert module.eye(np.array([0.0, 1.0])).at[1].value.tolist() == [0, 2] and "focal" in dir(found)
+    assert pickle.loads(pickle.dumps(found)).focal.value == math.e
+    with pytest.raises(AttributeError, match="a record `Eye` has no attribute 'focus'"):
+        found.focus  # noqa: B018
+    assert not hasattr(found.focal, "at")
 
 
 def test_an_array_with_names_is_one_of_records() -> None:

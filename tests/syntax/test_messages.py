@@ -362,6 +362,8 @@ def test_arrays_and_folds() -> None:
     check_messages("""
         x = fold s = 0 for i in 1..3
         #                          ^ error[P0104]: expected the step of `fold` in parentheses
+        x = (c with a = 1, b = 2)
+        #                  ^^^^^ error[P0108]: `b = …` stands behind a `with` of one field
         x = xs[0:2]
         #       ^ error[P0103]: an index is one place, not a range
         x = xs[0..2]

@@ -19,6 +19,7 @@ from msgspec.structs import replace
 
 from potto.integrate.events import Shortfall
 from potto.runtime.answers.arithmetic import Operators, Pair, applied, operand, reduced
+from potto.runtime.answers.named import WithFields
 from potto.runtime.answers.printing import (
     MISSED,
     attainable,
@@ -89,7 +90,7 @@ def _number(x: Any, error: Any) -> str:
 UNSHOWN = ("notes", "stats", "shortfalls")
 
 
-class Estimate(Operators, Struct, frozen=True, eq=False):
+class Estimate(Operators, WithFields, Struct, frozen=True, eq=False):
     """The outcome of an evaluation: a number, or an array of them, that knows its error.
 
     It computes and compares as its value does, with numbers, arrays and other estimates; errors are carried to first

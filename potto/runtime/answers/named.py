@@ -1,6 +1,7 @@
 """Records as answers: tuples that know the names of their parts, and are shown as programs write them.
 
-Owns `Named`. What is evaluated is tuples; the type of an answer says which of them are records.
+Owns `Named`, and `WithFields` for answers that may be such. What is evaluated is tuples; the type of an answer says
+which of them are records.
 """
 
 from __future__ import annotations
@@ -36,6 +37,23 @@ class Named(tuple[Any, ...]):
     def written(self, parts: Iterable[str]) -> str:
         """`Camera(eye=(0, 0, -5), focal=1.5)`, of its parts as texts."""
         return f"{self.record}({', '.join(f'{n}={part}' for n, part in zip(self.fields, parts, strict=True))})"
+
+
+class WithFields:
+    """An answer, whose parts can be taken by their names where it is a record."""
+
+    __slots__ = ()
+
+    def __getattr__(self, name: str) -> Any:
+        own: tuple[str, ...] = getattr(type(self), "__struct_fields__", ())  # which an answer lacks while it is made
+        parts = None if name.startswith("_") or name in own else self._parts
+        if isinstance(parts, Named) and name in parts.fields:
+            return self._part(parts.fields.index(name))
+        of = f"a record `{parts.record}`" if isinstance(parts, Named) else "an answer"
+        raise AttributeError(f"{of} has no attribute {name!r}", name=name, obj=self)
+
+    def __dir__(self) -> list[str]:
+        return [*super().__dir__(), *getattr(self._parts, "fields", ())]
 
 
 def named(value: Any, type: Type) -> Any:
