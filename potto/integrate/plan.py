@@ -1,8 +1,8 @@
 """What is known of an integral before any number: its levels, the kernels' terms, and the traces of its jumps.
 
-Owns `Plan` and its cache. A plan is made once for an integral, the functions that it calls and the plain decisions
-that were met on the way (which side of a recursion's condition, the bounds of a sum); it is used again as long as
-those decisions come out the same.
+Owns `Plan`, `make` and `numbers_in`. A plan is made once for an integral, the functions that it calls and the plain
+decisions that were met on the way (which side of a recursion's condition, the bounds of a sum); it is used again as
+long as those decisions come out the same.
 """
 
 from __future__ import annotations
@@ -132,7 +132,7 @@ class Plan(Struct, frozen=True, dict=True):
     @cached_property
     def width(self) -> int:
         """How many numbers the integrand comes to, at the least: where it is 0 everywhere nothing else tells."""
-        return _numbers(self.term.body if self.inlined is None else self.inlined)
+        return numbers_in(self.term.body if self.inlined is None else self.inlined)
 
     @cached_property
     def searches(self) -> int:
@@ -162,13 +162,13 @@ class Plan(Struct, frozen=True, dict=True):
         return trace
 
 
-def _numbers(body: Term) -> int:
+def numbers_in(body: Term) -> int:
     """How many numbers a term comes to, as far as it says so."""
     match body:
         case Tuple():
-            return sum(map(_numbers, children(body)))
+            return sum(map(numbers_in, children(body)))
         case If() | Branch():
-            return max(_numbers(body.then), _numbers(body.orelse))
+            return max(numbers_in(body.then), numbers_in(body.orelse))
         case _:
             return 1
 

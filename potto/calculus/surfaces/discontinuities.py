@@ -93,11 +93,11 @@ def findings(term: Term, resolve: Resolve, decide: Decide = undecided) -> tuple[
     """All surfaces of a term, jumps with the trace that forces them. Raises TooDeep."""
     searched = _Search(resolve, decide).term(term, {}, (), 0)
     found = tuple(_carried_out(f, resolve) for f in searched)
-    ends = {end: None for f in found if f.kind == "jump" for end in _ends_of_domain(f.surface)}
+    ends = {end: None for f in found if f.kind == "jump" for end in ends_of_domain(f.surface)}
     return (*found, *(Finding("kink", end) for end in ends))
 
 
-def _ends_of_domain(surface: Term) -> Iterator[Term]:
+def ends_of_domain(surface: Term) -> Iterator[Term]:
     """Where a condition stops being defined, if it does: on what lies beyond it has no side.
 
     An edge that is a period's is a pole, on both sides of which there is a value.

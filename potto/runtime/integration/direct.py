@@ -104,7 +104,10 @@ class Direct(Struct, frozen=True):
             if len(self.rules) >= MOST_FUNCTIONS:
                 self.rules.clear()
             with making:
-                self.rules[key] = self._rule(working, here)
+                try:
+                    self.rules[key] = self._rule(working, here)
+                except _Passed:
+                    return here, None
         return here, self.rules[key]
 
     def _given(self, machine: Machine, env: Mapping[str, Value]) -> tuple[dict[str, Value] | None, tuple[Lam, ...]]:
@@ -122,7 +125,8 @@ class Direct(Struct, frozen=True):
         return here, functions
 
     def _rule(self, machine: Machine, env: dict[str, Value]) -> Straight | None:
-        """The rule that the general way would come to for all numbers, if it is proved."""
+        """The rule that the general way would come to for all numbers, if it is proved. Raises _Passed where at these
+        ones it need not be made."""
         reach = machine.linker.reach
         try:
             term, full = filled(self.term, env, reach)
@@ -134,10 +138,16 @@ class Direct(Struct, frozen=True):
             problem = Problem(machine.apart(), term, *linked(env), solve, 1, True)
             if many(problem):
                 return None
+            if problem.on_known_sides() and not problem.flat:  # between planes the rule is by far the shortest way
+                raise _Passed
             plan = problem.plan(next(iter(preferred(problem))))
         except (PottoError, Mixed, TooDeep, RecursionError):
             return None
         return None if plan.decisions or plan.premise is not None else plan.straight
+
+
+class _Passed(Exception):
+    """Some surfaces pass by all that is integrated over."""
 
 
 class SettledCall(Struct, frozen=True):

@@ -132,7 +132,7 @@ def _integrate(machine: Machine, term: Integral, env: dict[str, Value], outermos
     sums = poisoned(_grouped(problem, flat), problem.env)
     if sums.v.shape[0] == 1 and not sums.v.any():  # where nothing is integrated it is not known how many numbers it is
         alone = problem if problem.batch == 1 else problem.member(0)  # one plan need not be for all of them
-        sums = sums.widened(alone.plan().width)
+        sums = sums.widened(alone.width())
     if not outermost:
         for event, _ in problem.events:
             machine.note(event.outside())
@@ -147,8 +147,26 @@ def _integrate(machine: Machine, term: Integral, env: dict[str, Value], outermos
 
 def _grouped(problem: Problem, flat: dict[str, Value]) -> Sums:
     """What an integral amounts to; members for which recursions take different courses apart from one another."""
+    parts = problem.on_known_sides()
+    if parts:
+        return _by_sides(problem, flat, parts)
     groups = problem.courses() if problem.batch > 1 else []
     return _in_groups(problem, flat, groups) if len(groups) > 1 else _in_cases(problem, flat)
+
+
+def _by_sides(problem: Problem, flat: dict[str, Value], parts: list[tuple[Ints, Integral]]) -> Sums:
+    """The integrals of a batch, of some of which it is known what is left of them."""
+    if problem.batch == 1:
+        return solve(problem.changed(term=parts[0][1]))
+    rest = np.setdiff1d(np.arange(problem.batch), np.concatenate([index for index, _ in parts]))
+    found = Whole()
+    for index, term in (*parts, *([(rest, problem.term)] if rest.size else [])):
+        here = gather(flat, index)
+        with problem.among(index, here) as part:
+            own = part if term is problem.term else part.changed(term=term)
+            found.put(index, _in_groups(own, here, own.courses() or [np.arange(index.size)]))
+        problem.events.take(part.events, index)
+    return found.sums
 
 
 def _in_groups(problem: Problem, flat: dict[str, Value], groups: Iterable[Ints]) -> Sums:

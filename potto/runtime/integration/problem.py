@@ -26,13 +26,15 @@ from potto.diagnostics import PottoError
 from potto.integrate.elimination.recursion import Eliminated, eliminated
 from potto.integrate.events import Events
 from potto.integrate.pieces import Sums, still
-from potto.integrate.plan import Plan, make, unpacked_plan
+from potto.integrate.plan import Plan, make, numbers_in, unpacked_plan
 from potto.kernels.cells import Array, Bools, Cell, Ints, Value, map_arrays
 from potto.kernels.making import making
 from potto.runtime.evaluation.functions import Closure, Derivative
 from potto.runtime.evaluation.machine import Machine
+from potto.runtime.integration.known_sides import Sided, sided
 
 MOST_INTEGRALS = 1024
+MOST_LOOKED_AT = 8  # members that are each asked on which sides they lie
 
 Functions = dict[str, Lam | Deriv]
 
@@ -66,7 +68,7 @@ def linked(env: dict[str, Value]) -> tuple[Functions, dict[str, Value]]:
 
 class Known(Struct):
     """What was found out about an integral and all that it calls: plans, one for each course that it may take; the
-    steps that eliminate its variables; the parameters that decide its course. Empty where nobody has asked.
+    steps that eliminate its variables; the parameters that decide its course; its sides. Empty where nobody has asked.
 
     key: what it is kept under on disk. packed: the plans as they are kept.
     """
@@ -76,6 +78,7 @@ class Known(Struct):
     packed: list[bytes] = []
     steps: list[Eliminated | None] = []
     deciding: list[frozenset[str]] = []
+    sided: list[Sided | None] = []
 
 
 _known: OrderedDict[Any, Known] = OrderedDict()
@@ -166,6 +169,30 @@ class Problem:
         """What members come to at other parameters; what is met there is forgotten."""
         return self.solver(self.at(env, machine=self.machine.apart(), outermost=False))
 
+    @property
+    def flat(self) -> bool:
+        """Whether all surfaces are planes, as far as anyone has asked."""
+        return all(each is None or each.flat for each in self.known.sided)
+
+    def on_known_sides(self) -> list[tuple[Ints, Integral]]:
+        """For the members of which some surfaces are known to pass all by: what is left of the integral, and of which
+        members it is that. Of many members it is not asked."""
+        machine = self.machine
+        drawn = machine.settings.method in ("mc", "qmc")
+        if self.batch > MOST_LOOKED_AT or not self.outermost or drawn or machine.costs is not None:
+            return []
+        found: dict[Integral, list[int]] = {}
+        with making:
+            if not self.known.sided:
+                self.known.sided.append(sided(self.term, self.plain_function))
+            whole = self.known.sided[0]
+            for number in range(self.batch if whole is not None else 0):
+                own = self if self.batch == 1 else self.picked(np.array([number]))
+                left = None if whole is None else whole.at(own.env)
+                if left is not None:
+                    found.setdefault(left, []).append(number)
+        return [(np.array(members), left) for left, members in found.items()]
+
     # What is known before any number
 
     def plan(self, order: Integral | None = None) -> Plan:
@@ -175,6 +202,11 @@ class Problem:
         if plan is None:
             plan = self.chosen[order] = (self if order is self.term else self.changed(term=order))._plan()
         return plan
+
+    def width(self) -> int:
+        """How many numbers the integrand comes to, at the least."""
+        sided = next(iter(self.known.sided), None)
+        return self.plan().width if sided is None else numbers_in(sided.term.body)
 
     @cached_property
     def chosen(self) -> dict[Integral, Plan]:
