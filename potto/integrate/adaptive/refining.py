@@ -16,7 +16,15 @@ from typing import Any
 import numpy as np
 
 from potto.integrate.adaptive.divergence import endless, given_up
-from potto.integrate.adaptive.refinement import Tally, doubtful, filled, missed_peak, stragglers, too_coarse
+from potto.integrate.adaptive.refinement import (
+    DOUBTFUL_ROUNDS,
+    Tally,
+    doubtful,
+    filled,
+    missed_peak,
+    stragglers,
+    too_coarse,
+)
 from potto.integrate.adaptive.reynolds import Totals, sums, totals
 from potto.integrate.adaptive.short_neighbours import unseen
 from potto.integrate.adaptive.tails import paced
@@ -38,7 +46,6 @@ PROMISING = 1e-2
 # smooth: what grows fast towards an end is taken for a steep power, and a grade for that is harder than the integrand
 # itself, however short the piece (`exp(t)` under a normal density).
 ROUGH, SMOOTH = 1e-8, 1e-12
-DOUBTFUL_ROUNDS = 8
 TOO_LITTLE = 8  # how many times more than an error, or rounding, tells is missed
 COUNTS = 0.01  # the part of what an error may be from which on it counts what was missed beside an end
 LONG = 8  # after how many halvings it is looked for members that take longer than the others
