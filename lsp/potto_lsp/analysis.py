@@ -258,8 +258,7 @@ class Analysis:
 
     def _guarded(self, key: str) -> list[Diagnostic]:
         """The diagnostics of a file, part by part. A part that fails is logged, once for each error message."""
-        from potto.checking.check import absolute, definition_diagnostics
-        from potto.types import check_statement
+        from potto.checking.check import absolute, definition_diagnostics, statement_diagnostics
 
         db, found = self.db, list[Diagnostic]()
         for part in (syntax_diagnostics, module_diagnostics):
@@ -275,8 +274,7 @@ class Analysis:
                 self.failed(key, name, error)
         for reference in statements(db, key):
             try:
-                said = check_statement(db, key, reference.statement)
-                found += [absolute(db, key, one, reference.start) for one in said]
+                found += statement_diagnostics(db, key, reference)
             except Exception as error:
                 self.failed(key, "statement", error)
         return found

@@ -12,7 +12,7 @@ from potto.calculus.checking.diffeo import check_conditions
 from potto.diagnostics import Diagnostic, Related
 from potto.modules import chunk_start, module_diagnostics, statements
 from potto.modules.graph import Run, name_runs
-from potto.modules.texts import moved, syntax_diagnostics
+from potto.modules.texts import StatementRef, moved, syntax_diagnostics
 from potto.query import Database, query
 from potto.quick import replace
 from potto.reports.render import Located
@@ -31,7 +31,7 @@ def diagnostics(db: Database, file: str) -> tuple[Located, ...]:
             start = chunk_start(db, file, name)
             found += [absolute(db, file, d, start) for d in said]
     for reference in statements(db, file):
-        found += [absolute(db, file, d, reference.start) for d in check_statement(db, file, reference.statement)]
+        found += statement_diagnostics(db, file, reference)
     return tuple(Located(file, d) for d in arranged(found))
 
 
@@ -60,6 +60,13 @@ def definition_diagnostics(db: Database, file: str, name: str) -> tuple[Diagnost
     if has_errors(found) or interface(db, file, name).broken:
         return found
     return (*found, *check_conditions(db, file, name))
+
+
+def statement_diagnostics(db: Database, file: str, reference: StatementRef) -> list[Diagnostic]:
+    """What the types of a statement of a script are said to be wrong in, with absolute spans: nothing where the parser
+    had to guess."""
+    said = () if reference.broken else check_statement(db, file, reference.statement)
+    return [absolute(db, file, d, reference.start) for d in said]
 
 
 def has_errors(found: Iterable[Diagnostic]) -> bool:

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 
 from msgspec.structs import replace
 
-from potto.checking.check import absolute, definition_diagnostics, has_errors
+from potto.checking.check import absolute, definition_diagnostics, has_errors, statement_diagnostics
 from potto.diagnostics import Diagnostic
 from potto.modules import (
     DefinitionTarget,
@@ -30,7 +30,6 @@ from potto.modules.texts import head, import_starts, imports, is_diffeo, outline
 from potto.query import Database, query
 from potto.reports.render import Located
 from potto.syntax import nodes
-from potto.types import check_statement
 
 Way = tuple[str, ...]  # the definitions on the way from an expression, the last one included
 
@@ -90,7 +89,7 @@ def file_errors(db: Database, file: str) -> tuple[Diagnostic, ...]:
 def statement_errors(db: Database, file: str, reference: StatementRef) -> tuple[Located, ...]:
     """What keeps a statement of a script from being run: its own errors and those of the definitions that it needs."""
     beside = _within(db, file, file_errors(db, file), {reference.start})
-    said = [absolute(db, file, d, reference.start) for d in check_statement(db, file, reference.statement)]
+    said = statement_diagnostics(db, file, reference)
     own = dict.fromkeys((*beside, *(d for d in said if d.severity == "error")))
     spoiled = standing_in_the_way(db, file, reference.statement)
     return (*(Located(file, d) for d in own), *spoiled)

@@ -41,10 +41,11 @@ ChunkRef = Chunk
 
 @value
 class StatementRef:
-    """A top-level statement of a script; its spans are relative to `start`."""
+    """A top-level statement of a script; its spans are relative to `start`. broken: the parser had to guess at it."""
 
     start: int
     statement: nodes.Print | nodes.For | nodes.ExpressionStatement
+    broken: bool = False
 
 
 @value
@@ -349,9 +350,10 @@ def statements(db: Database, file: str) -> tuple[StatementRef, ...]:
     whole = layout(db, file)
     for piece, start in zip(whole.pieces, whole.starts):
         for chunk in piece.statements:
-            item = parsed(db, chunk.text, is_diffeo(file)).item
-            if isinstance(item, (nodes.Print, nodes.For, nodes.ExpressionStatement)):
-                found.append(StatementRef(start + chunk.start, item))
+            read = parsed(db, chunk.text, is_diffeo(file))
+            if isinstance(read.item, (nodes.Print, nodes.For, nodes.ExpressionStatement)):
+                broken = any(d.severity == "error" for d in read.diagnostics)
+                found.append(StatementRef(start + chunk.start, read.item, broken))
     return tuple(found)
 
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+
 import pytest
 from command_runs import Potto
 
@@ -66,3 +69,14 @@ def test_other_commands_answer_too(potto: Potto) -> None:
     assert ran.status == 1 and ran.out == "" and "through `over`" in ran.err
     ran = potto("test", "main.po", main=PROGRAM + "#> good(0.5)\n#= 0.5\n")
     assert ran.status == 1 and ran.out.startswith("1 live expression in 1 file: all hold") and "P0301" in ran.err
+
+
+@pytest.mark.parametrize(
+    "statement", ["[x for x in v if x > 1]", "v[1..2]", "print [q for q in w if z > 1]", "for i in 0..2 print(i) if"]
+)
+def test_of_a_statement_that_is_guessed_at_only_the_parser_speaks(potto: Potto, tmp_path: Path, statement: str) -> None:
+    """As of a definition: what it was taken for has types that nobody meant."""
+    (tmp_path / "script.po").write_text(f"v = [1, 2, 3]\n{statement}\n", encoding="utf-8")
+    ran = potto("check", "script.po")
+    codes = re.findall(r"error\[(P\d+)\]", ran.out + ran.err)
+    assert codes and all(code.startswith("P01") for code in codes), codes

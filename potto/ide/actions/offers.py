@@ -22,7 +22,7 @@ from potto.query import Database
 from potto.source import Span
 from potto.syntax import node_at, nodes, parse_chunk
 from potto.syntax.nodes import Node
-from potto.types import check_statement, interface
+from potto.types import check_statement
 
 
 class Offer(Struct, frozen=True):
@@ -63,11 +63,11 @@ def diagnostics_at(db: Database, file: str, span: Span) -> list[Diagnostic]:
     """What is said about the places that a selection touches, with absolute spans."""
     found = list(module_diagnostics(db, file))
     for chunk in all_chunks(db, file, span):
-        found += (shift(d, chunk.start) for d in parsed(db, chunk.text, chunk.diffeo).diagnostics)
-        item = chunk.parsed(db).item
-        name = owner(db, chunk)
-        if name is not None and interface(db, file, name).broken:
+        read = parsed(db, chunk.text, chunk.diffeo)
+        found += (shift(d, chunk.start) for d in read.diagnostics)
+        if any(d.severity == "error" for d in read.diagnostics):
             continue  # the parser has spoken; what it guessed means nothing to the calculus
+        item, name = chunk.parsed(db).item, owner(db, chunk)
         if name is not None and name in names(db, file):
             found += (absolute(db, file, d, chunk.start) for d in definition_diagnostics(db, file, name))
         elif isinstance(item, nodes.Print | nodes.For | nodes.ExpressionStatement):
