@@ -144,6 +144,10 @@ class FunctionLike(Protocol):
     def pattern(self, directions: int) -> Pattern: ...
     def change(self, how: Callable[[Value], Value]) -> FunctionLike: ...
 
+    def or_other(self, other: Any, mask: Bools) -> FunctionLike:
+        """This one for the members of a mask, another for the rest."""
+        ...
+
 
 Value = Union[Cell, "tuple[Value, ...]", "list[Value]", Rows, FunctionLike]
 

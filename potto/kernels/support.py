@@ -17,7 +17,7 @@ import numpy as np
 
 from potto.core.terms import Branch, Const, If, Term
 from potto.kernels import tape
-from potto.kernels.cells import Mask, Number, Value, combined
+from potto.kernels.cells import Cell, Mask, Number, Rows, Value, combined
 from potto.kernels.whole import FUNCTIONS
 from potto.primitives import PRIMITIVES, Primitive
 from potto.primitives.registry import Elementwise
@@ -118,7 +118,11 @@ def beside(surface: Number, tangent: Number, side: float) -> Mask:
 
 
 def select_value(mask: Mask, a: Value, b: Value) -> Value:
-    """`select` for values of any kind; both must have the same structure."""
+    """`select` for values of any kind; both must have the same structure, but for functions, of which it is either."""
     if not isinstance(mask, np.ndarray):
         return a if mask else b
-    return combined(partial(select, mask), a, b)
+    if isinstance(a, tuple | list) and isinstance(b, type(a)) and len(a) == len(b):
+        return type(a)([select_value(mask, *items) for items in zip(a, b, strict=True)])
+    if a is b or isinstance(a, Cell | Rows | list | tuple):
+        return combined(partial(select, mask), a, b)
+    return a.or_other(b, mask)

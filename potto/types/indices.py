@@ -145,7 +145,7 @@ def _beyond(inference: Inference, size: Type, node: nodes.Index, index: nodes.Ex
     if low.base is None and low.offset < 0:
         by, why = low.offset, f"it reaches {low.offset}, and no array has one below 0"
     elif known is not None and high.base is known.base and high.offset >= known.offset:
-        by, why = high.offset - known.offset + 1, "it reaches the number of elements, and is to stay below"
+        by, why = high.offset - known.offset + 1, "it reaches the number of elements, and the last index is one less"
         if known.base is None:
             why = f"it reaches {high.offset}, and the array has {_elements(known.offset)}"
     else:

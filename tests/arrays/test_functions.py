@@ -147,3 +147,36 @@ def test_what_holds_functions_is_given_to_a_derivative_as_it_is() -> None:
 def test_an_answer_that_holds_functions_is_no_argument() -> None:
     with pytest.raises(potto.PottoError, match="`p` holds functions"):
         HOLDERS.weighed(HOLDERS.P(2.0, HOLDERS.square), 3.0)
+
+
+CHOOSING = r"""
+record Disc(r: Real, shade: Real -> Real)
+def flat(u) 1
+def twice(u) 2*u
+def above(k) \u . [u > k]
+def light(t) sum f in [if i == 1 then flat else above(t*i) for i in 0..2] (integral [0, 1] f(u) d(u))
+def discs(t) [if i == 1 then Disc(r=0.5, shade=flat) else Disc(r=t, shade=above(0.1*i)) for i in 0..2]
+def seen(t) sum d in discs(t) (integral [0, 1] d.shade(u)*[u < d.r] d(u))
+rows = [if i == 1 then [flat, twice] else [twice, above(0.1*i)] for i in 0..2]
+def total(t) sum row in rows (row[0](t) + row[1](t/2))
+names = [if i == 1 then flat else twice for i in 0..2]
+def product(t) sum f in names (f(t))
+"""
+
+
+def test_elements_choose_functions_by_their_places() -> None:
+    """Records and rows of functions as well, with what they have captured: one by one, as a batch, and derived."""
+    module = potto.compile(CHOOSING)
+    t = np.array([0.3, 0.4])
+    for name, exact, slope in (
+        ("light", 3 - 2 * t, [-2, -2]),  # (1 - 0) + 1 + (1 - 2t)
+        ("seen", t + 0.5 + (t - 0.2), [2, 2]),
+        ("total", 2 * t + 1 + (1 + t) + 2 * t + 0, [5, 5]),  # t/2 > 0, but not > 0.2
+        ("product", 2 * t + 1 + 2 * t, [4, 4]),
+    ):
+        function = getattr(module, name)
+        assert function(t).value == pytest.approx(exact, rel=1e-14), name
+        assert potto.grad(function)(t).tangent == pytest.approx(slope, rel=1e-13), name
+        for one, value in zip(t, exact, strict=True):
+            assert function(float(one)).value == pytest.approx(value, rel=1e-14), name
+            assert potto.vjp(function, 1.0)(float(one)).tangent == pytest.approx(slope[0], rel=1e-13), name

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from potto.core.terms import Lam
-from potto.kernels.cells import Cell, Pattern, Rows, Value, pad
+from potto.kernels.cells import Bools, Cell, Pattern, Rows, Value, pad
 
 
 class Closure:
@@ -41,6 +41,9 @@ class Closure:
         if not self.captured:
             return self
         return Closure(self.lam, {n: how(v) for n, v in self.captured.items()}, self.inexact, self.origin)
+
+    def or_other(self, other: Closure, mask: Bools) -> Closure:
+        return Chosen([self, other], Cell(np.where(mask, 0.0, 1.0)))
 
     def padded(self, directions: int) -> Closure:
         return self.change(lambda v: pad(v, directions))

@@ -26,7 +26,7 @@ from potto.kernels.cells import (
     map_trace,
 )
 from potto.kernels.tape import Node, scattered
-from potto.runtime.evaluation.functions import Chosen
+from potto.runtime.evaluation.functions import Chosen, Closure
 from potto.runtime.evaluation.machine import Machine
 
 Pick = Callable[[Array], Array]
@@ -86,7 +86,24 @@ def apart(
             out[mask] = row
         return out
 
-    return combined(whole, *parts)
+    return _together(parts, masks, whole)
+
+
+def _together(parts: Sequence[Value], masks: Sequence[Bools], whole: Callable[..., Array]) -> Value:
+    """The values of the members of each mask as those of all; functions as one of which each member has chosen its
+    own. whole: puts the numbers of all masks together."""
+    first = parts[0]
+    if isinstance(first, tuple | list) and all(type(part) is type(first) and len(part) == len(first) for part in parts):
+        return type(first)([_together(items, masks, whole) for items in zip(*parts, strict=True)])
+    functions = [part for part in parts if isinstance(part, Closure)]
+    if len(functions) < len(parts) or all(function is parts[0] for function in functions):
+        return combined(whole, *parts)
+
+    def spread(row: Number, own: int) -> Number:
+        return whole(*(row if n == own else np.zeros(int(mask.sum())) for n, mask in enumerate(masks)))
+
+    options = [f.change(lambda v, n=n: map_arrays(v, lambda row: spread(row, n))) for n, f in enumerate(functions)]  # type: ignore[misc]
+    return Chosen(options, Cell(np.select(masks, range(len(masks))).astype(float)))
 
 
 def _spoil(value: Value, nan: Number) -> Value:
