@@ -91,10 +91,10 @@ def mismatch(
         help = "it is applied there, as a function; if a product is meant, write it with `*`"
     elif isinstance(resolve(actual), ArrayOf) and isinstance(resolve(expected), Real):
         help = "write it for each element, `[… for x in xs]`, or take one, `xs[i]`"
-    elif isinstance(resolve(expected), ArrayOf):
-        help = _columns(resolve(actual), resolve(expected), expr)
     elif is_whole_dual(actual, expected):
         help = BY_PARTS
+    elif isinstance(resolve(expected), ArrayOf):
+        help = _columns(resolve(actual), resolve(expected), expr)
     message = f"{what} must be `{wanted}`, but this is `{shown}`"
     return kind(expr.span, message, label=f"this is `{shown}`", related=related, help=help)
 
@@ -102,11 +102,15 @@ def mismatch(
 def is_whole_dual(actual: Type, expected: Type) -> bool:
     """Whether a value and its tangent are given where functions in it want each part with its own."""
     given, wanted = resolve(actual), resolve(expected)
-    if not isinstance(given, TupleOf) or not isinstance(wanted, TupleOf) or len(given.items) != 2:
+    if not isinstance(given, TupleOf) or len(given.items) != 2 or not holds_functions(wanted):
         return False
     halves = [resolve(item) for item in given.items]
+    if isinstance(wanted, ArrayOf):
+        return all(isinstance(half, ArrayOf) for half in halves)
+    if not isinstance(wanted, TupleOf):
+        return False
     count = len(wanted.items)
-    return holds_functions(wanted) and all(isinstance(half, TupleOf) and len(half.items) == count for half in halves)
+    return all(isinstance(half, TupleOf) and len(half.items) == count for half in halves)
 
 
 def _columns(actual: Type, expected: Type, expr: nodes.Expr) -> str:

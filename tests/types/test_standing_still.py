@@ -176,3 +176,13 @@ def test_nothing_moves() -> None:
         k = deriv(f)((1, 2), 3)
         #            ^^^^^^ warning[P0615]: no argument of this derivative has a tangent
     """)
+
+
+@pytest.mark.parametrize("call", [
+    "deriv(h)((P(1, square), P(0, deriv(square))), (2, 1))",
+    "deriv(all)(([P(1, square)], [P(0, deriv(square))]), (2, 1))",
+])  # fmt: skip
+def test_what_to_write_for_it(call: str) -> None:
+    with pytest.raises(potto.PottoError) as told:
+        potto.compile(HOLDERS).eval(call)
+    assert "`(value, tangent)` for a number, `deriv(f)` for a function" in told.value.diagnostics[0].help
