@@ -118,7 +118,8 @@ def field(inference: Inference, type: Type, name: str, node: nodes.Member | node
         inference.fields.setdefault(id(node), []).append(place)
         inference.parts.append(Part(span, name, found, found.items[place]))
         return found.items[place]
-    inference.report(_no_part(inference, found, name, span, place))
+    owner = node.path if isinstance(node, nodes.Member) else getattr(node.value, "id", "")
+    inference.report(_no_part(inference, found, name, span, place, owner if owner.isidentifier() else "u"))
     return UNKNOWN
 
 
@@ -137,12 +138,13 @@ def place_of(name: str) -> int | None:
     return AXES.index(name) if len(name) == 1 and name in AXES else None
 
 
-def _no_part(inference: Inference, found: Type, name: str, span: Span, place: int | None) -> Diagnostic:
+def _no_part(inference: Inference, found: Type, name: str, span: Span, place: int | None, owner: str) -> Diagnostic:
+    """owner: what it is written behind."""
     help, label, suggestions = "", f"of `{format_type(found)}`", tuple[Suggestion, ...]()
     if isinstance(found, TupleOf) and found.record is not None:
         return no_field(inference.outside, span, name, found.record)
     if isinstance(found, Meta):
-        help = "say in the head what it is: `(u: (Real, Real))`"
+        help, label = f"say in the head what it is: `({owner}: (Real, Real))`, or the name of a record", "of what?"
         message = f"it is not known what `.{name}` is a part of"
     elif isinstance(found, TupleOf):
         count = len(found.items)

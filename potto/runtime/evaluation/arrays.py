@@ -124,9 +124,9 @@ def _among(options: list[Any], places: Any) -> Value:
     """For each of a batch the option at its place: functions, or records and arrays with some in them, by parts."""
     if all(isinstance(option, Closure) for option in options):
         return chosen(options, places, _among)
-    kind = type(options[0])
-    if kind in (tuple, list) and all(type(option) is kind and len(option) == len(options[0]) for option in options):
-        return kind([_among(list(parts), places) for parts in zip(*options, strict=True)])
+    first = options[0]
+    if isinstance(first, tuple | list) and all(type(o) is type(first) and len(o) == len(first) for o in options):
+        return type(first)([_among(list(parts), places) for parts in zip(*options, strict=True)])
     rows = listed(options)
     if isinstance(rows, Rows):
         return gathered(rows, places)
