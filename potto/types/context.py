@@ -204,12 +204,15 @@ class Inference:
         self.locals.append(local)
         return local
 
-    def bind_group(self, parameters: tuple[nodes.Parameter, ...], annotated: Callable[[Any], Type]) -> list[Local]:
+    def bind_group(
+        self, parameters: tuple[nodes.Parameter, ...], annotated: Callable[[Any], Type], of_lambda: bool = False
+    ) -> list[Local]:
         """Bring a group of parameters into scope."""
         found = []
         for parameter in parameters:
             type = self.fresh() if parameter.annotation is None else annotated(parameter.annotation)
-            found.append(self.bind(parameter, Local(parameter.name, parameter.span, "parameter", type)))
+            local = Local(parameter.name, parameter.span, "parameter", type, of_lambda=of_lambda)
+            found.append(self.bind(parameter, local))
         return found
 
     def local(self, node: object, name: str, span: Span, kind: LocalKind, type: Type) -> Local:

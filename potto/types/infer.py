@@ -223,7 +223,7 @@ def escape(expr: nodes.Expr, message: str) -> Diagnostic:
 @rule(nodes.Lambda)
 def _lambda(inference: Inference, node: nodes.Lambda) -> Type:
     with inference.scope.inside(), inference.at_times():
-        groups = [inference.bind_group(group, lambda a: written_type(inference, a)) for group in node.groups]
+        groups = [inference.bind_group(group, lambda a: written_type(inference, a), True) for group in node.groups]
         result = returned(inference, inference.infer(node.body), node.body)
     for group in reversed(groups):
         result = Function(tuple(Parameter(local.name, local.type) for local in group), result)

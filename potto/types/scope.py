@@ -25,7 +25,7 @@ from potto.syntax import nodes
 from potto.types.interfaces import Interface
 from potto.types.kinds import NOT_DEFINED
 from potto.types.reasons import Reasons
-from potto.types.types import Meta, Type
+from potto.types.types import Meta, Type, place_of
 
 LocalKind = Literal["parameter", "local", "variable", "index", "loop", "size"]
 
@@ -35,6 +35,7 @@ class Local:
     """A name that is bound inside a definition. `known`: its value is a function whose parameters have names.
 
     `value` is what a local name was bound to (the whole right side), for messages and for names of conditions.
+    `of_lambda`: a parameter of a lambda, not of a definition.
     """
 
     name: str
@@ -45,6 +46,7 @@ class Local:
     known: bool = False
     value: nodes.Expr | None = None
     used: bool = False
+    of_lambda: bool = False
 
 
 @value
@@ -169,8 +171,10 @@ def undefined_member(outside: Outside, scope: Scope, node: nodes.Member) -> Diag
     """What is said of `module.name` where there is no such module, or nothing of that name in it."""
     head, db, file = node.path.partition(".")[0], outside.db, outside.file
     found = scope.find(head)
-    if found is not None and found.kind == "parameter" and (records := _records_with(outside, node.name)):
-        return _not_annotated(node, found, records)
+    if found is not None and found.kind == "parameter" and node.path == head:
+        meant = _records_with(outside, node.name) or ([] if found.of_lambda else _tuples_with(node.name))
+        if meant:
+            return _not_annotated(node, found, meant)
     local = found is not None
     module = None if local else resolve_module(db, file, node.path)
     if module is not None:
@@ -201,14 +205,22 @@ def _records_with(outside: Outside, field: str) -> list[str]:
     return found
 
 
-def _not_annotated(node: nodes.Member, local: Local, records: list[str]) -> Diagnostic:
-    """What is said of a field of a parameter that may be anything."""
+def _tuples_with(part: str) -> list[str]:
+    """The shortest tuple that has a part of this name, as a type."""
+    place = place_of(part)
+    return [] if place is None else [f"({', '.join(['Real'] * max(place + 1, 2))})"]
+
+
+def _not_annotated(node: nodes.Member, local: Local, types: list[str]) -> Diagnostic:
+    """What is said of a part of a parameter that may be anything. types: what it may be meant to be."""
     behind = Span(local.span.end, local.span.end)
-    edits = [Suggestion(f"Write `{node.path}: {name}`", (Replacement(behind, f": {name}"),)) for name in records]
+    edits = [Suggestion(f"Write `{node.path}: {type}`", (Replacement(behind, f": {type}"),)) for type in types]
+    what = "how many parts `{}` has" if types[0].startswith("(") else "which record `{}` is"
     return NOT_DEFINED(
-        node.path_span, f"it is not known which record `{node.path}` is, so `{node.path}.{node.name}` is not defined",
+        node.path_span,
+        f"it is not known {what.format(node.path)}, so `{node.path}.{node.name}` is not defined",
         label="any number", related=(Related(local.span, "said here with its type"),),
-        help=f"say what it is: `{node.path}: {records[0]}`", suggestions=tuple(edits),
+        help=f"say what it is: `{node.path}: {types[0]}`", suggestions=tuple(edits),
     )  # fmt: skip
 
 

@@ -223,6 +223,16 @@ def result_of(type: Type) -> Type:
     return type
 
 
+AXES = "xyzw"
+
+
+def place_of(name: str) -> int | None:
+    """Which item of a tuple a field is: `0`, `1`, … or `x`, `y`, `z`, `w`."""
+    if name.isdigit():
+        return int(name[:9])
+    return AXES.index(name) if len(name) == 1 and name in AXES else None
+
+
 def holds_functions(type: Type) -> bool:
     """Whether it is a function, or a tuple or array in which there is one."""
     match resolve(type):

@@ -17,10 +17,21 @@ from potto.types.context import Inference, Part
 from potto.types.format import format_type, format_types
 from potto.types.lookups import image, interp
 from potto.types.mismatches import array_fields, describe, no_field
-from potto.types.types import REAL, UNKNOWN, ArrayOf, Count, Diffeo, Meta, TupleOf, Type, Unknown, resolve
+from potto.types.types import (
+    REAL,
+    UNKNOWN,
+    ArrayOf,
+    Count,
+    Diffeo,
+    Meta,
+    TupleOf,
+    Type,
+    Unknown,
+    place_of,
+    resolve,
+)
 from potto.types.unify import SIZES, unify
 
-AXES = "xyzw"
 _LEFT = {op: f"the left of `{op}`" for op in "+-*/"}
 _RIGHT = {op: f"the right of `{op}`" for op in "+-*/"}
 
@@ -129,13 +140,6 @@ def place_in(type: Type, name: str) -> int | None:
     if record is not None:
         return record.fields.index(name) if name in record.fields else None
     return place_of(name)
-
-
-def place_of(name: str) -> int | None:
-    """Which item of a tuple a field is: `0`, `1`, … or `x`, `y`, `z`, `w`."""
-    if name.isdigit():
-        return int(name[:9])
-    return AXES.index(name) if len(name) == 1 and name in AXES else None
 
 
 def _no_part(inference: Inference, found: Type, name: str, span: Span, place: int | None, owner: str) -> Diagnostic:

@@ -18,8 +18,7 @@ from potto.query import Database
 from potto.source import Span
 from potto.syntax import parse_expression
 from potto.types import Real, TupleOf, Type, format_type, infer_expression
-from potto.types.types import resolve
-from potto.types.vectors import AXES
+from potto.types.types import AXES, resolve
 
 MOST = 12  # numbered parts that are proposed
 _WITH = re.compile(r"\bwith\s+(?=\w*$|\(|\w+\s*=)")
