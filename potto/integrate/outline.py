@@ -89,9 +89,10 @@ class Outlines:
 
 def outlined(
     term: Integral, found: Sequence[Finding], hides: bool, resolve: Resolve, decide: Decide, over: LevelSet | None,
-    findings: Callable[[Term], Iterable[Finding]],
+    findings: Callable[[Term], Iterable[Finding]], mixed: Iterable[Term] = (),
 ) -> Outline:  # fmt: skip
-    """The outline of an integral whose integrand has these surfaces; `findings` gives those of a bound."""
+    """The outline of an integral whose integrand has these surfaces; `findings` gives those of a bound. mixed: surfaces
+    with conditions inside, as they were written: these may be decided in what is integrated."""
     levels, groups = group_levels(sweep(term, found, resolve, decide, True, over).levels)
     numbers = {j.path: (g.number, j.orientation) for g in groups for j in g.cut.jumps}
     return Outline(
@@ -104,18 +105,23 @@ def outlined(
         tuple(dict.fromkeys(f.surface for f in found if f.kind != "step")),
         _doublings(term, found),
         _may_fold(term, levels),
-        *_kinks(term, found, findings),
+        *_kinks(term, found, findings, mixed),
     )
 
 
-def _kinks(term: Integral, found: Iterable[Finding], findings: Callable[[Term], Iterable[Finding]]) -> tuple[Lam, int]:
+def _kinks(
+    term: Integral, found: Iterable[Finding], findings: Callable[[Term], Iterable[Finding]], mixed: Iterable[Term]
+) -> tuple[Lam, int]:
     """Where an integrand, and what it is integrated over, have kinks that may lie along a stretch, and how many of
-    these are steps of parameters alone."""
+    these are steps of parameters alone, those within surfaces counted."""
     box, names = extents(term), frozenset(term.variables)
     inside = (*found, *(f for pair in term.bounds for bound in pair for f in findings(bound)))
     kinks = dict.fromkeys(f.surface for f in inside if f.kind == "kink")
     lying = tuple(k for k in kinks if not any(monotone(k, v, box) for v in term.variables))
-    jumps = dict.fromkeys(f.surface for f in inside if f.kind in ("jump", "step") and not f.surface.free & names)
+    within = (f for surface in mixed for f in findings(surface))
+    jumps = dict.fromkeys(
+        f.surface for f in (*inside, *within) if f.kind in ("jump", "step") and not f.surface.free & names
+    )
     steps = tuple(step for step in jumps if step not in kinks)
     return function_of(tuple_((*lying, *steps))), len(steps)
 

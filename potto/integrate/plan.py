@@ -261,7 +261,8 @@ def _outlined(
     whole, times = term, asked.times
     premises: tuple[Term, ...] = ()
     confused = False
-    mixed = any(map(_may_be_mixed, found)) or any(has_nested(i.body) for i in _inner_integrals(term))
+    several = tuple(f.surface for f in found if _may_be_mixed(f))
+    mixed = bool(several) or any(has_nested(i.body) for i in _inner_integrals(term))
     if mixed:
         apart = _apart(term, inline, asked.remember, number)
         if apart is not None:
@@ -274,7 +275,7 @@ def _outlined(
         found = asked.findings(term.body)
         hides = hidden(term, found, asked.resolve)
     reaches = not asked.unknown
-    outline = outlined(term, found, hides, asked.resolve, asked.remember, over, asked.findings)
+    outline = outlined(term, found, hides, asked.resolve, asked.remember, over, asked.findings, several)
     if term is whole and asked.times == times and reaches and over is None and not mixed:
         outlines.put(found, outline)
     return outline, reaches, premises, confused

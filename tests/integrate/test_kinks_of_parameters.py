@@ -113,6 +113,9 @@ def rate(program: str, t: Any, dt: Any = 1.0) -> potto.Estimate:
     return potto.deriv(potto.compile(f"def f(t)\n    {program}").f)((t, dt))
 
 
+GUARD = "(if t == 0 then 1 else (exp(t) - 1)/t)"
+
+
 @pytest.mark.parametrize(("program", "t", "backward", "forward"), KINKS, ids=[row[0] for row in KINKS])
 def test_both_derivatives_are_told(program: str, t: float, backward: float, forward: float) -> None:
     answer = rate(program, t)
@@ -170,12 +173,25 @@ def test_where_the_whole_has_one_derivative_nothing_is_noted(program: str, t: fl
     ("if t == 0 then 1 else log(1 + t)/t", 0.0, -0.5),
     ("if t == 3 then 0.25 else (sqrt(t + 1) - 2)/(t - 3)", 3.0, -1 / 64),
     ("integral [0, 1] (if t == 0 then x else sin(x*t)/t) d(x)", 0.0, 0.0),
+    (f"integral [0, 1] {GUARD}*x d(x)", 0.0, 1 / 4),
+    (f"integral [0, {GUARD}] x d(x)", 0.0, 1 / 2),
+    # int_0^1 [x < g/2] 2 x dx = g^2/4, and the area below x + y = g has the derivative g g' on either side of g = 1
+    (f"integral [0, 1] [x < {GUARD}/2]*2*x d(x)", 0.0, 1 / 4),
+    (f"let z = {GUARD} in integral [0, 1] [x < z/2]*2*x d(x)", 0.0, 1 / 4),
+    (f"integral ([0, 1], [0, 1]) [x + y < {GUARD}] d(x, y)", 0.0, 1 / 2),
 ])  # fmt: skip
 def test_a_guard_at_a_single_point_has_the_derivative_of_what_it_guards(program: str, t: float, exact: float) -> None:
     """Extrapolated from places beside it: nine digits, since what is guarded cancels, by eps/t^2 of its derivative."""
     answer = rate(program, t)
     assert not answer.notes
     assert abs(answer.tangent - exact) <= answer.tangent_error <= 1e-9
+
+
+def test_a_condition_of_the_parameters_within_a_surface_has_two_sides() -> None:
+    """x < z/2 with z = 1 up to t = 0 and 1 + t/2 beyond it: the length is z/2."""
+    answer = rate("integral [0, 1] [x < (if t <= 0 then 1 else 1 + t/2)/2] d(x)", 0.0)
+    (note,) = answer.notes
+    assert (float(note.backward), float(note.forward)) == pytest.approx((0.0, 0.25), abs=1e-9)
 
 
 def test_members_of_an_array_are_told_apart() -> None:

@@ -45,14 +45,14 @@ def approached(
     side; else what three steps tell is enough.
     """
     limit, missed = _led_to([at(step * CLOSER**i) for i in range(3)], here, step * CLOSER**2)
-    if rtol is None or not (np.isfinite(limit) & (missed > rtol * np.abs(limit))).any():
+    if rtol is None or (np.isfinite(limit) & (missed <= rtol * np.abs(limit))).all():
         return limit, missed
     finer = [step * APART**-1.75 * 0.5**i for i in range(FINE)]
     try:
         found = [at(h) for h in finer]
     except PottoError:  # so far away there may be no value
         return limit, missed
-    return _smooth(found, np.array(finer), limit, missed)
+    return _smooth(found, np.array(finer), here, limit, missed)
 
 
 def _led_to(found: Sequence[Parts], here: tuple[Array, Array], step: float) -> tuple[Array, Array]:
@@ -93,30 +93,41 @@ def one_direction(value: Value, d: int) -> Value:
     return map_cells(value, lambda cell: Cell(cell.v, cell.e, cell.t[d : d + 1], cell.et[d : d + 1]))
 
 
-def _smooth(found: Sequence[Parts], places: Array, limit: Array, missed: Array) -> tuple[Array, Array]:
+def _smooth(
+    found: Sequence[Parts], places: Array, here: tuple[Array, Array], limit: Array, missed: Array
+) -> tuple[Array, Array]:
     """The limit of derivatives at places that shrink, and how far off it may be, where these are smooth: by polynomials
     through neighbours among them, of which the one counts that changes the least when either end is left out. The limit
-    known before stays where nothing better is found, or another limit, which something nearer by has."""
+    known before stays where nothing better is found, or another limit, which something nearer by has. One that is no
+    number may come of rounding, which grows towards the parameters: it gives way to one that hardly changes, unless
+    what is at the parameters is another value."""
     slopes = np.array([np.where(np.isfinite(et), t, np.nan) for _, _, t, et in found])
-    noise = np.array([et for *_, et in found])
+    known = np.isfinite(limit)
+    # What is guarded cancels: of what is divided by a step rounding leaves eps/step, and of its derivative eps/step^2.
+    cancelled = [np.finfo(float).eps * np.abs(v) / h**2 for h, (v, *_) in zip(places, found, strict=True)]
+    noise = np.array([et + np.where(known, 0.0, more) for more, (*_, et) in zip(cancelled, found, strict=True)])
 
     def through(first: int, end: int) -> tuple[Array, Array]:
         near = places[first:end]
         weights = np.array([np.prod([h / (h - own) for h in near if h != own]) for own in near])
         return np.tensordot(weights, slopes[first:end], 1), np.tensordot(np.abs(weights), noise[first:end], 1)
 
-    best, off = limit, missed
-    size = UNNOTICED * np.fmax.reduce(np.abs(slopes))
+    best, off = limit, np.where(known, missed, np.inf)
+    size = np.fmax.reduce(np.abs(slopes))
+    v, e, *_ = found[-1]
+    leap, sure = np.abs(v - here[0]), e + here[1] + LEAP * (np.abs(here[0]) + np.abs(v))
     for first, end in itertools.combinations(range(FINE + 1), 2):
         if end - first < FEWEST:
             continue
         value, rounding = through(first, end)
         change = np.fmax(*(np.abs(value - through(*fewer)[0]) for fewer in ((first + 1, end), (first, end - 1))))
-        apart = np.abs(value - limit)
+        apart = np.where(known, np.abs(value - limit), 0.0)
         less = change + rounding + np.where(apart <= missed + change + rounding, 0.0, apart)
-        better = (apart <= missed + change + rounding + size) & (less < off)
+        near = apart <= missed + change + rounding + UNNOTICED * size
+        steady = (less <= SAME * size) & (leap <= 2 * np.abs(places[-1]) * (np.abs(value) + less) + sure)
+        better = np.where(known, near, steady) & (less < off)
         best, off = np.where(better, value, best), np.where(better, less, off)
-    return best, off
+    return best, np.where(np.isfinite(best), off, missed)
 
 
 def _limit(far: float, nearer: float, nearest: float, noise: float) -> tuple[float, float]:
