@@ -8,9 +8,11 @@ from __future__ import annotations
 from typing import Any
 
 import mpmath as mp
+import numpy as np
 import pytest
 
 import potto
+from potto.integrate.adaptive import short_neighbours
 
 D = mp.sqrt(mp.mpf("0.15") ** 2 + mp.mpf("0.05") ** 2)  # between the centres of two discs
 
@@ -204,3 +206,18 @@ def test_where_sections_end_on_a_range_without_ends() -> None:
     loop = "y^3 + x^3 < 0.4*y*x and (abs(y) + abs(x) <= 0.4 or hypot(y, x) <= t)"
     answer = potto.compile(f"def f(t) integral [0, 1] (integral (y ~ normal(0, 1)) [{loop}] d(y)) d(x)").f(0.7)
     assert abs(answer.value - exact) <= answer.error + 1e-16 and answer.error <= 1e-11
+
+
+def test_between_planes_nothing_is_looked_for_beside_short_stretches(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two corners of a triangle lie 1e-3 apart: what is further in is a polynomial between its cuts. At t = 0.2 edges
+    coincide, so that no rule is taken to be exact."""
+    looked = []
+    beside = short_neighbours._missed
+    monkeypatch.setattr(short_neighbours, "_missed", lambda *given: looked.append(1) or beside(*given))
+    edges = "[y < t*x and y > 0.2*x and 1000*(x - 0.5) < 2 - y]"
+    for condition, expected in ((edges, False), (edges.replace("t*x", "t*x^3"), True)):
+        looked.clear()
+        f = potto.compile(f"def f(t) integral ([0, 1], [0, 1]) {condition}*(1 + x*y) d(x, y)").f
+        with potto.settings(backend="numpy"):
+            potto.grad(f)(np.array([0.7, 0.8, 0.2] * 4))
+        assert bool(looked) is expected, condition

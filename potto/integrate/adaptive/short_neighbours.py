@@ -23,9 +23,12 @@ ROUNDED = 8.0  # how many times farther than their rounding ends must lie apart
 
 def unseen(work: PanelBatch, p: Pieces) -> tuple[Array, Array] | None:
     """What whole segments may have missed next to their left and to their right end, (C, S) each, where what lies
-    beyond is much shorter than they are; None where no segment has such a neighbour."""
-    seg = work.seg
+    beyond is much shorter than they are; None where no segment has such a neighbour, and where what is further in is
+    integrated between planes: all that it can do happens at cuts."""
+    seg, degrees = work.seg, work.parent.degrees
     if work.last or p.coefficients is None or work.machine.overdrawn():
+        return None
+    if degrees and degrees[work.number] is not None:
         return None
     length = seg.b - seg.a
     sides, finite = _beyond(seg), seg.kind < substitution.UP
