@@ -212,15 +212,18 @@ def _tuples_with(part: str) -> list[str]:
 
 
 def _not_annotated(node: nodes.Member, local: Local, types: list[str]) -> Diagnostic:
-    """What is said of a part of a parameter that may be anything. types: what it may be meant to be."""
+    """What is said of a part of a parameter that may be anything. types: what it may be meant to be. In a
+    lambda that is written in parentheses, which may not be there."""
     behind = Span(local.span.end, local.span.end)
     edits = [Suggestion(f"Write `{node.path}: {type}`", (Replacement(behind, f": {type}"),)) for type in types]
+    written = f"{node.path}: {types[0]}"
     what = "how many parts `{}` has" if types[0].startswith("(") else "which record `{}` is"
     return NOT_DEFINED(
         node.path_span,
         f"it is not known {what.format(node.path)}, so `{node.path}.{node.name}` is not defined",
         label="any number", related=(Related(local.span, "said here with its type"),),
-        help=f"say what it is: `{node.path}: {types[0]}`", suggestions=tuple(edits),
+        help=f"say what it is: `\\({written}) . …`" if local.of_lambda else f"say what it is: `{written}`",
+        suggestions=() if local.of_lambda else tuple(edits),
     )  # fmt: skip
 
 

@@ -32,6 +32,8 @@ def test_names() -> None:
 def test_near_names_and_the_blanks_around_a_dot() -> None:
     assert only("radius = 2\ndef f(x) raduis*x").help == "did you mean `radius`?"
     assert "`c . x`" in only(r"k = \c . c.x").help
+    camera = "record Camera(focal: Real)\n"
+    assert only(camera + r"k = \c . c.focal").help == r"say what it is: `\(c: Camera) . …`"
     assert only("def f(u) u.x").help == "say what it is: `u: (Real, Real)`"
     assert only("def f(u) u.z").help == "say what it is: `u: (Real, Real, Real)`"
     assert only("def f(u) exp(u.1)").help == "say in the head what it is: `(u: (Real, Real))`, or the name of a record"
