@@ -51,7 +51,8 @@ class Sided(Struct):
     """An integral, its integrand with calls of functions that jump carried out.
 
     surfaces: those whose sides can be told, by all calls in them carried out; `ends`: where these stop being defined.
-    flat: whether all are planes. met: what is left of the integral, by the sides on which all of it lies.
+    flat: whether all are affine in each variable by itself. met: what is left of the integral, by the sides on which
+    all of it lies.
     """
 
     term: Integral

@@ -171,7 +171,7 @@ class Problem:
 
     @property
     def flat(self) -> bool:
-        """Whether all surfaces are planes, as far as anyone has asked."""
+        """Whether all surfaces are affine in each variable by itself, as far as anyone has asked."""
         return all(each is None or each.flat for each in self.known.sided)
 
     def on_known_sides(self) -> list[tuple[Ints, Integral]]:
