@@ -144,8 +144,10 @@ class Plan(Struct, frozen=True, dict=True):
 
     @property
     def mass(self) -> Term:
-        """What tells how much of an infinite range matters."""
-        return self.term.body if self.over is None else self.over.factor
+        """What tells how much of an infinite range matters; what stands behind a call does so as well."""
+        if self.over is not None:
+            return self.over.factor
+        return self.term.body if self.inlined is None else self.inlined
 
     def trace(self, sides: Mapping[int, Mask]) -> Trace | None:
         """The trace that forces the groups to the sides given: a mask, true where the canonical surface is >= 0."""

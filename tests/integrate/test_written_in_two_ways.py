@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import pytest
@@ -89,6 +90,18 @@ def test_a_sum_of_magnitudes_stays_a_sum() -> None:
     assert abs(found.value - 2 / 3 * T**4) <= found.error + 1e-15 <= 1e-9
     assert abs(found.tangent - 8 / 3 * T**3) <= found.tangent_error + 1e-15 <= 1e-9
     assert found.converged and found.evals <= 50_000
+
+
+@pytest.mark.parametrize("product", ["exp(-x^2/2)*[sin(3*x) < t]", "weight(x)*[sin(3*x) < t]", "both(x, t)"])
+def test_a_density_behind_a_call_ends_an_infinite_range(product: str) -> None:
+    """Half of a normal density lies where a sine is negative; the roots are at k*pi/3."""
+    text = "def weight(x) exp(-x^2/2)\ndef both(x, t) exp(-x^2/2)*[sin(3*x) < t]\n"
+    f = potto.compile(f"{text}def f(t) integral [-inf, inf] {product} d(x)").f
+    r = potto.deriv(f)((0.0, 1.0))
+    slope = sum(math.exp(-((k * math.pi / 3) ** 2) / 2) / 3 for k in range(-20, 21))
+    assert r.converged
+    assert abs(r.value - math.sqrt(math.pi / 2)) <= r.error < 1e-9
+    assert abs(r.tangent - slope) <= r.tangent_error < 1e-9
 
 
 LEANS = "6.123233995736766e-17"
