@@ -247,11 +247,10 @@ class _Tiles(Struct):
 
 
 def _parts(count: int, size: int) -> Iterator[Part]:
-    """Blocks of about this size; none of one member alone, which would be evaluated as a number."""
+    """Blocks of this size; what is left at the end goes with the last one, unless it is more than half a block."""
     start = 0
     while start < count:
-        stop = min(start + size, count)
-        stop = count if count - stop == 1 else stop
+        stop = start + size if count - start > size + size // 2 else count
         yield start, stop
         start = stop
 

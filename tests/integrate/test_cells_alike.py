@@ -48,6 +48,28 @@ def test_the_line_of_equation_1() -> None:
     assert answer.converged and answer.evals <= 500 * PLAIN.size
 
 
+def test_proofs_for_regions_of_parameters_ask_for_few_nodes() -> None:
+    """Two parameters, each with a speed of its own; 10 x 10 nodes are enough where coefficients ask for 14 x 14."""
+    a, b = np.random.default_rng(3).uniform(0.5, 2.0, (2, 2000))
+    b /= 4
+    program = potto.compile("def f(a, b) integral ([0, 1], [0, 1]) exp(a*x)/(1 + y)^2*[y < b*x] d(x, y)")
+    with potto.settings(backend="numpy"):
+        answer = potto.grad(program.f, ("a", "b"))(a, b)
+
+    def value(a: Any, b: Any) -> Any:
+        """Over y first: the integrand is exp(a*x)*b*x/(1 + b*x)."""
+        return mp.quad(lambda x: mp.exp(a * x) * b * x / (1 + b * x), [0, 1])
+
+    assert answer.converged and answer.evals <= 150 * a.size
+    assert np.max(answer.error) <= 1e-13 and np.max(answer.tangent_error) <= 1e-12
+    for i in range(0, 2000, 250):
+        at = mp.mpf(float(a[i])), mp.mpf(float(b[i]))
+        assert abs(answer.value[i] - value(*at)) <= answer.error[i]
+        for d, wrt in enumerate(((1, 0), (0, 1))):  # tangent: one row per parameter
+            exact = mp.diff(value, at, wrt)
+            assert abs(answer.tangent[d][i] - exact) <= answer.tangent_error[d][i]
+
+
 @pytest.mark.parametrize("order", ["x, y", "y, x"])
 def test_circles_turn_at_both_ends(order: str) -> None:
     r = np.linspace(0.2, 0.95, 100)

@@ -16,7 +16,7 @@ import pytest
 
 from potto.core.terms import Const, Prim, Term, Var, add, const, div, mul, neg, pow_, prim, sub, var
 from potto.integrate.rules.complex_enclosures import Form, enclosed
-from potto.integrate.rules.proved_orders import Cell, Region, proved
+from potto.integrate.rules.proved_orders import Cell, Region, proved, proved_of_each
 
 OPS: dict[str, Callable[..., Any]] = {
     "add": lambda *a: sum(a[1:], a[0]),
@@ -143,3 +143,20 @@ def test_a_rule_errs_by_no_more_than_was_proved(seed: int) -> None:
         checked += 1
     assert checked > 8
     assert largest > 1e-7  # the bound is not so far off that nothing was tested
+
+
+@np.errstate(all="ignore")
+def test_many_regions_at_once_are_proved_as_one_by_one() -> None:
+    """The same nodes and, to rounding, the same bounds; of a polynomial no variable takes more than it is known to."""
+    x, y, c = var("x"), var("y"), var("c")
+    frames = [[const(0.0), add(c, const(0.3))], [mul(c, x), add(const(1.0), x)]]
+    cell = Cell(((0, 1), (0, 1)), mul(add(const(2.0), mul(x, y)), prim("exp", mul(c, y))))
+    middles, radius, tolerance = np.array([0.3, 0.5, 0.9]), {"c": 2.0**-6}, 1e-10
+    at_once = proved_of_each("xy", frames, cell, {"c": middles}, radius, (None, None), tolerance)
+    for number, middle in enumerate(middles):
+        alone = proved("xy", frames, [cell], {"c": float(middle)}, radius, tolerance)
+        assert alone is not None
+        assert tuple(at_once.nodes[number]) == (*alone.outer, *alone.inner)
+        assert at_once.error[number] == pytest.approx(alone.error, rel=1e-12)
+    known = proved_of_each("xy", frames, cell, {"c": middles}, radius, (1, None), tolerance)
+    assert (known.nodes[:, 0] == 1).all() and (known.nodes[:, 1] <= at_once.nodes[:, 1]).all()

@@ -22,7 +22,7 @@ from msgspec import Struct
 from potto.core.terms import children
 from potto.integrate.fixed.alone import Face, machine_code, promotion, summed_alone, summed_by
 from potto.integrate.fixed.moving_sums import Totals, evaluated, summed
-from potto.integrate.fixed.regions import Path, known, region_of, settle
+from potto.integrate.fixed.regions import LOOSEST, Path, known, region_of, settle
 from potto.integrate.fixed.straight import CLEAR, Straight, nothing
 from potto.integrate.pieces import Evaluator, Sums
 from potto.integrate.rules.gauss import EPS
@@ -34,8 +34,6 @@ from potto.kernels.native.objects import Loaded
 from potto.kernels.native.promotion import Promotion
 
 MOST_CELLS, MOST_NODES = 24, 60_000
-# Nobody gains by proofs for less than this.
-LOOSEST = 1e-8
 # How far off a rule may be for a sum that cancels, as a part of what it is when nothing does.
 NOISE = 1e-12
 

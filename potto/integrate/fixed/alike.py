@@ -1,9 +1,10 @@
 """Members of a batch whose cells are alike, by one product rule for all cells of a shape.
 
 Owns `by_shapes`. What `a_priori` does for one member, with orders that are proved, is done here for many at once, with
-orders that the Legendre coefficients at the nodes show to be enough. Nodes move with the ends of their cells (Reynolds'
-transport theorem), so that the tangents of the sums are the derivatives and no boundary term is left. Rounding is kept
-track of, as everywhere outside of integrals, at a few nodes of each cell, spread over it.
+orders that are proved for regions of parameters (`proved_shapes`), or that the Legendre coefficients at the nodes show
+to be enough. Nodes move with the ends of their cells (Reynolds' transport theorem), so that the tangents of the sums
+are the derivatives and no boundary term is left. Rounding is kept track of, as everywhere outside of integrals, at a
+few nodes of each cell, spread over it.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from potto.integrate.fixed.product_rule import CANCELS, FEW, Rule
+from potto.integrate.fixed.proved_shapes import proved_rules
 from potto.integrate.fixed.straight import ROW_BITS, Straight
 from potto.integrate.fixed.topologies import Alike, topologies
 from potto.integrate.pieces import Evaluator, Sums, added_up, gather, together
@@ -83,28 +85,40 @@ def _settled(
 ) -> Bools:  # fmt: skip
     """Add the integrals over cells of one shape to those of their members; for which of them that could be done."""
     fine = np.zeros(cell.members.size, dtype=bool)
-    todo = np.argsort(_between(cell.rows), kind="stable")
-    for rule in _tried(plan, degrees, machine, env, cell):
-        step = max(1, POINTS // rule.span(env))
-        left = []
-        for start in range(0, todo.size, step):
-            index = todo[start : start + step]
-            found = rule.applied(env, index)
-            good = rule.good(found)
-            left.append(index[~good])
-            parts = [found.number, found.truncated, found.rounding, found.gross]
-            if left[-1].size:
-                index, parts = index[good], [part[:, good] for part in parts]
-            fine[index] = True
-            owners = cell.members[index]
-            for whole, part in zip(total, parts, strict=True):
-                for row, numbers in zip(whole, part, strict=True):
-                    if numbers.any():
-                        row += np.bincount(owners, numbers, row.size)
-        todo = np.concatenate(left)
+    between = _between(cell.rows)
+    todo = np.argsort(between, kind="stable")
+    exact = [None if d is None else d // 2 + 1 for d in degrees] or [None] * len(plan.variables)
+    if None in exact:
+        rules, todo = proved_rules(plan, exact, machine, env, cell, todo, between)
+        left = [_applied(rule, env, those, total, fine) for rule, those in rules]
+        todo = np.concatenate((*left, todo))
+        if not todo.size:
+            return fine
+    for rule in _tried(plan, exact, machine, env, cell, todo):
+        todo = _applied(rule, env, todo, total, fine)
         if not todo.size:
             break
     return fine
+
+
+def _applied(rule: Rule, env: dict[str, Value], todo: Ints, total: Sequence[Array], fine: Bools) -> Ints:
+    """Add what a rule gives for some of its cells, where it is good enough, and note that; those for which it isn't."""
+    step, left = max(1, POINTS // rule.span(env)), []
+    for start in range(0, todo.size, step):
+        index = todo[start : start + step]
+        found = rule.applied(env, index)
+        good = rule.good(found)
+        parts = [found.number, found.truncated, found.rounding, found.gross]
+        if not good.all():
+            left.append(index[~good])
+            index, parts = index[good], [part[:, good] for part in parts]
+        fine[index] = True
+        owners = rule.cell.members[index]
+        for whole, part in zip(total, parts, strict=True):
+            for row, numbers in zip(whole, part, strict=True):
+                if numbers.any():
+                    row += np.bincount(owners, numbers, row.size)
+    return np.concatenate(left) if left else todo[:0]
 
 
 def _between(rows: Ints) -> NDArray[np.integer[Any]]:
@@ -118,10 +132,9 @@ def _between(rows: Ints) -> NDArray[np.integer[Any]]:
 
 
 def _tried(
-    plan: Straight, degrees: Sequence[int | None], machine: Evaluator, env: dict[str, Value], cell: Alike
+    plan: Straight, exact: Sequence[int | None], machine: Evaluator, env: dict[str, Value], cell: Alike, todo: Ints
 ) -> list[Rule]:
-    """Rules with ever more nodes: the one that does for a polynomial, or from the one on that does for most members."""
-    exact = [None if d is None else d // 2 + 1 for d in degrees] or [None] * len(plan.variables)
+    """Rules with ever more nodes: the one that does for a polynomial, or from the one on that does for most cells."""
     known = tuple(n is not None for n in exact)
     tried = [
         Rule(plan, cell, orders, known, machine)
@@ -130,9 +143,9 @@ def _tried(
     ]
     if all(known):
         return tried[:1]
-    if cell.members.size <= FEW:
+    if todo.size <= FEW:
         return tried[2:]
-    few = np.arange(0, cell.members.size, max(1, cell.members.size // PILOTS))
+    few = todo[:: max(1, todo.size // PILOTS)]
     for number, rule in enumerate(tried[:-1]):
         if rule.good(rule.applied(env, few)).mean() >= ENOUGH:
             return tried[number:]

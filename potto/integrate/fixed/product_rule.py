@@ -45,13 +45,18 @@ class Measured(Struct, frozen=True):
 
 
 class Rule(Struct, frozen=True):
-    """A product rule for cells of one shape, with so many nodes for each variable; exact: for polynomials."""
+    """A product rule for cells of one shape, with so many nodes for each variable.
+
+    exact: the variables whose coefficients need not tell what it leaves out, as of polynomials. beyond: what is proved
+    that it leaves out of each cell, (1 + k, cells).
+    """
 
     plan: Straight
     cell: Alike
     orders: tuple[int, ...]
     exact: tuple[bool, ...]
     machine: Evaluator
+    beyond: Array | None = None
 
     @property
     def nodes(self) -> int:
@@ -79,7 +84,7 @@ class Rule(Struct, frozen=True):
         given = zip(self.orders, self.asked, turning, strict=True)
         axes = [Axis.of(order, asked, ends, several) for order, asked, ends in given]
         raw = self.raw(env, index, axes)
-        truncated = np.zeros(raw.number.shape)
+        truncated = np.zeros(raw.number.shape) if self.beyond is None else self.beyond.take(index, 1)
         for order, exact, sizes in zip(self.orders, self.exact, raw.coefficients, strict=True):
             if not exact:
                 truncated += analytic_truncation(sizes, order)

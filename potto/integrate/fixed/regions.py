@@ -21,6 +21,8 @@ from potto.kernels.making import making
 
 # The truncation error that is proved for the value, as a part of the accuracy that is asked for.
 MARGIN = 1e-3
+# Nobody gains by proofs for less than this.
+LOOSEST = 1e-8
 # A region of parameters: this part of the power of two below a parameter's size, or below the first variable's range.
 REGION = 2.0**-5
 TINY = 1e-280

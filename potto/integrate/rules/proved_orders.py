@@ -1,8 +1,10 @@
 """How many nodes are enough, proved before any is evaluated.
 
-Owns `Cell`, `Region` and `proved`. On a cell between known cuts the integrand is one formula, analytic wherever
-`discs` can bound it. If |f| <= M on the ellipse with foci -1, 1 and half-axes adding up to rho, the Gauss rule
-with n nodes errs, relative to the length of its interval, by at most
+Owns `Cell`, `Region`, `Orders`, `proved` and `proved_of_each`.
+
+On a cell between known cuts the integrand is one formula, analytic wherever `discs` can bound it. If |f| <= M on the
+ellipse with foci -1, 1 and half-axes adding up to rho, the Gauss rule with n nodes errs, relative to the length of its
+interval, by at most
 
     (32/15) M rho^(-2n) / (1 - rho^(-2))                                                (n >= 2)
 
@@ -27,7 +29,7 @@ from msgspec import Struct
 
 from potto.core.terms import Term
 from potto.integrate.rules.complex_enclosures import Form, enclosed
-from potto.kernels.cells import Array, Bools
+from potto.kernels.cells import Array, Bools, Ints
 
 MOST_NODES = 16
 # Radii of the discs that are tried, in half-lengths of the cell; the last three are for polynomials.
@@ -64,9 +66,18 @@ class Region(Struct, frozen=True, eq=False):
         return self.error * max((abs(v) / self.radius[n] for n, v in speeds.items() if v), default=0.0)
 
 
+class Orders(Struct, frozen=True):
+    """What was proved of one cell in each of R regions: nodes per variable (R, D), 0 where none were found, and bounds
+    of the integral's error (R,)."""
+
+    nodes: Ints
+    error: Array
+
+
 @lru_cache(maxsize=8)
 def _probes(count: int) -> tuple[Array, Array, Array]:
-    """Centres and radii of the variables at all probes, (D, N) each, and rho of each; N by direction, box, radius."""
+    """Centres and radii of the variables at all probes, (D, N) each, and a bound of what a disc says of the rule's
+    error, (orders, radii); N by direction, box, radius."""
     parts = BOXES[count]
     middles = (2 * np.arange(parts) + 1) / parts - 1
     centres, reach = [], []
@@ -79,7 +90,9 @@ def _probes(count: int) -> tuple[Array, Array, Array]:
                 centres.append(centre)
                 reach.append(wide)
     radii = np.array(RADII)
-    return np.array(centres).T.copy(), np.array(reach).T.copy(), radii + np.sqrt(radii * radii - 1)
+    rho, n = radii + np.sqrt(radii * radii - 1), np.arange(2, MOST_NODES + 1)[:, None]
+    powers = np.maximum(SURE * 32 / 15 * rho ** (-2.0 * n) / (1 - rho**-2.0), 1e-300)
+    return np.array(centres).T.copy(), np.array(reach).T.copy(), powers
 
 
 def proved(
@@ -90,20 +103,10 @@ def proved(
 
     middle, radius: of the region of each parameter; the proof holds on discs of twice the radius.
     """
-    count, names = len(variables), sorted(middle)
-    centres, reach, rho = _probes(count)
-    h = np.concatenate((reach, np.outer([2.0 * radius[name] for name in names], np.ones(reach.shape[1]))))
-    unit = np.eye(count + len(names))[:, :, None]
-    start = {name: Form(np.float64(middle[name]), unit[i], 0.0, h) for i, name in enumerate(names, count)}
-    n = np.arange(2, MOST_NODES + 1)[:, None]
-    powers = np.maximum(SURE * 32 / 15 * rho ** (-2.0 * n) / (1 - rho**-2.0), 1e-300)  # (orders, radii)
-    errors, total = np.zeros((len(cells), count, n.size)), 0.0
-    for i, cell in enumerate(cells):
-        form = _on_cell(variables, frames, cell, dict(start), unit, centres, h)
-        most = np.broadcast_to(form.most, h.shape[1:]).reshape(count, -1, 1, len(RADII))
-        errors[i] = (most * powers).min(axis=-1).max(axis=1)
-        total += float(np.broadcast_to(form.m, h.shape[1:])[: most[0].size].mean())
-    share = tolerance * abs(total) / (count * len(cells))
+    count, places = len(variables), {name: np.array([x]) for name, x in middle.items()}
+    bounds, sizes = zip(*(_bounds(variables, frames, cell, places, radius) for cell in cells), strict=True)
+    errors = np.array(bounds)[..., 0]
+    share = tolerance * abs(float(sum(size[0] for size in sizes))) / (count * len(cells))
     enough: Bools = np.all(errors <= share, axis=0)
     enough[0] = True
     if not (enough.any(axis=1).all() and (errors[:, 0, -1] <= share).all()):
@@ -111,6 +114,44 @@ def proved(
     outer, inner = (errors[:, 0] <= share).argmax(axis=1), enough[1:].argmax(axis=1)
     bound = sum(float(e[0, o] + e[np.arange(1, count), inner].sum()) for e, o in zip(errors, outer, strict=True))
     return Region(tuple(cells), tuple(int(o) + 2 for o in outer), tuple(int(i) + 2 for i in inner), bound, dict(radius))
+
+
+def proved_of_each(
+    variables: Sequence[str], frames: Sequence[Sequence[Term]], cell: Cell, middle: Mapping[str, Array],
+    radius: Mapping[str, float], exact: Sequence[int | None], tolerance: float,
+) -> Orders:  # fmt: skip
+    """The same of one cell in many regions at once, whose middles are (R,) each.
+
+    exact: the nodes of those variables for which it is known that they leave nothing out.
+    """
+    errors, size = _bounds(variables, frames, cell, middle, radius)
+    free = np.array([n is None for n in exact])
+    errors[~free] = 0.0
+    enough = errors <= tolerance * np.abs(size) / max(1, int(free.sum()))
+    number = enough.argmax(axis=1)
+    error = np.take_along_axis(errors, number[:, None], 1)[:, 0].sum(axis=0)
+    nodes = np.array([number[i] + 2 if n is None else np.full(size.size, n) for i, n in enumerate(exact)])
+    return Orders(np.where(enough.any(axis=1).all(axis=0), nodes, 0).T, error)
+
+
+def _bounds(
+    variables: Sequence[str], frames: Sequence[Sequence[Term]], cell: Cell, middle: Mapping[str, Array],
+    radius: Mapping[str, float],
+) -> tuple[Array, Array]:  # fmt: skip
+    """Of a cell in R regions: bounds of the error of rules along each variable, (D, orders, R), and what the integral
+    is about, (R,)."""
+    count, names = len(variables), sorted(middle)
+    centres, reach, powers = _probes(count)
+    own = np.outer([2.0 * radius[name] for name in names], np.ones(reach.shape[1]))
+    h = np.concatenate((reach, own))[:, None]
+    unit = np.eye(count + len(names))[:, :, None, None]
+    start = {name: Form(middle[name][:, None], unit[i], 0.0, h) for i, name in enumerate(names, count)}
+    form = _on_cell(variables, frames, cell, start, unit, centres, h)
+    shape = next(iter(middle.values())).size if middle else 1, centres.shape[1]
+    most = np.broadcast_to(form.most, shape).reshape(shape[0], count, -1, 1, len(RADII))
+    errors = (most * powers).min(axis=-1).max(axis=2)
+    size = np.broadcast_to(form.m, shape)[:, : shape[1] // count].mean(axis=1)
+    return np.moveaxis(errors, 0, -1), size
 
 
 def _on_cell(
