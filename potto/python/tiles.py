@@ -159,15 +159,18 @@ class _Tiles(Struct):
 
     def _size(self) -> int:
         """The size of blocks, by trying; one that was taken is done."""
-        size = PILOT
+        size = tried = PILOT
         while 2 * size <= self.count and size < MOST:
             self._alone((0, size))
             if ENOUGH <= self.spent < COLD:
                 self._alone((0, size))
             if self.spent >= ENOUGH:
                 break
-            size = min(size * (64 if self.spent < LITTLE else 2), MOST)
+            tried, size = size, min(size * (64 if self.spent < LITTLE else 2), MOST)
             self.done.clear()
+        else:  # twice as many take less than twice ENOUGH, and so may all
+            while size < self.count and size < MOST and self.spent * self.count <= 2 * ENOUGH * tried:
+                size *= 2
         if len(_sizes) > MOST_SIZES:
             _sizes.clear()
         _sizes[self.key] = size

@@ -11,14 +11,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from potto.integrate.fixed.product_rule import CANCELS, FEW, Rule
 from potto.integrate.fixed.proved_shapes import proved_rules
-from potto.integrate.fixed.straight import ROW_BITS, Straight
+from potto.integrate.fixed.straight import ROW_BITS, RowNumbers, Straight
 from potto.integrate.fixed.topologies import Alike, topologies
 from potto.integrate.pieces import Evaluator, Sums, added_up, gather, together
 from potto.kernels.cells import Array, Bools, Cell, Ints, Value
@@ -121,7 +119,7 @@ def _applied(rule: Rule, env: dict[str, Value], todo: Ints, total: Sequence[Arra
     return np.concatenate(left) if left else todo[:0]
 
 
-def _between(rows: Ints) -> NDArray[np.integer[Any]]:
+def _between(rows: RowNumbers) -> RowNumbers:
     """A number for the rows (variables, 2, M) between which cells lie. In its order neighbours lie between the same
     cuts, which numpy then takes whole."""
     digits = rows.reshape(-1, rows.shape[-1])

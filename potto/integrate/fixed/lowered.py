@@ -20,7 +20,7 @@ from potto.core.terms import Term
 from potto.integrate.fixed.axes import Axis, Raw
 from potto.integrate.fixed.formula_text import ONE, Place
 from potto.integrate.fixed.rule_text import NAME, RuleText
-from potto.integrate.fixed.straight import Straight
+from potto.integrate.fixed.straight import RowNumbers, Straight
 from potto.integrate.pieces import Evaluator
 from potto.kernels.cells import Array, Cell, Ints, Value
 from potto.kernels.making import counts
@@ -46,7 +46,7 @@ class LoweredCells(Struct, frozen=True):
         )
 
     def run(
-        self, function: Loaded, env: Mapping[str, Value], members: Ints, rows: Ints, axes: Sequence[Axis],
+        self, function: Loaded, env: Mapping[str, Value], members: Ints, rows: RowNumbers, axes: Sequence[Axis],
         directions: int,
     ) -> Raw:  # fmt: skip
         """The sums over cells. members: (M,), whose they are; rows: (variables, 2, M), of the frames, between which."""
@@ -78,10 +78,11 @@ def lowered_cells(plan: Straight, face: Term, directions: int, env: Mapping[str,
 
 
 def frame_of(out: Array, axes: Sequence[Axis], columns: Sequence[NDArray[Any]]) -> Ints:
-    """What a function is told: of how many members, LANES at least, where the rows of results go, the nodes, and where
-    the columns are that it takes."""
+    """What a function is told: of how many members, LANES at least, where the rows of results go, at how many ends of
+    stretches to look (at none where no coefficients tell), the nodes, and where the columns are that it takes."""
     where = out.shape[1], out.strides[0] // out.itemsize, address(out)
-    return np.array([*where, *(x for axis in axes for x in _told(axis)), *map(address, columns)], dtype=np.int64)
+    ends = 2 if any(axis.transform.shape[1] > 1 for axis in axes) else 0
+    return np.array([*where, ends, *(x for axis in axes for x in _told(axis)), *map(address, columns)], dtype=np.int64)
 
 
 def whole(column: Array, least: int) -> Array:

@@ -13,7 +13,7 @@ from msgspec import Struct, field
 
 from potto.integrate.fixed.formula_text import Place
 from potto.integrate.fixed.lowered import given, parts, places_of, whole
-from potto.integrate.fixed.straight import ROW_BITS, Straight
+from potto.integrate.fixed.straight import ROW_BITS, RowNumbers, Straight
 from potto.integrate.fixed.topology_text import FOUND, NAME, TopologyText
 from potto.integrate.pieces import Evaluator
 from potto.kernels.cells import Bools, Ints, Value
@@ -31,7 +31,7 @@ class Found(Struct, frozen=True):
     are (N,), and the sides of the surfaces in their middles, as numbers with a bit for each (N,)."""
 
     plain: Bools
-    rows: Ints
+    rows: RowNumbers
     members: Ints
     sides: Ints
 
@@ -74,11 +74,13 @@ class LoweredTopologies(Struct, frozen=True):
             members, between, sides = members[kept], between[kept], sides[kept]
         return Found(fine, self.rows(between), members, sides)
 
-    def rows(self, between: Ints) -> Ints:
+    def rows(self, between: Ints) -> RowNumbers:
         """The rows that such a number tells."""
         ends = 2 * len(self.plan.variables)
-        digits = [between >> ROW_BITS * (ends - 1 - n) & (1 << ROW_BITS) - 1 for n in range(ends)]
-        return np.array(digits).reshape(ends // 2, 2, -1)
+        rows = np.empty((ends, between.size), dtype=np.uint8)
+        for n, row in enumerate(rows):
+            row[:] = between >> ROW_BITS * (ends - 1 - n) & (1 << ROW_BITS) - 1
+        return rows.reshape(ends // 2, 2, -1)
 
 
 def lowered_topologies(plan: Straight, env: Mapping[str, Value]) -> LoweredTopologies:

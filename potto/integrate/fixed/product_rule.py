@@ -95,7 +95,7 @@ class Rule(Struct, frozen=True):
         return Measured(raw.number, truncated, rounding, gross)
 
     def raw(self, env: dict[str, Value], index: Ints, axes: list[Axis]) -> Raw:
-        way, members, rows = self.lowered(env), self.cell.members[index], self.cell.rows[:, :, index]
+        way, members, rows = self.lowered(env), self.cell.members.take(index), self.cell.rows.take(index, -1)
         function = way.function(self.machine)
         if function is not None:
             return way.run(function, env, members, rows, axes, self.machine.directions)

@@ -11,16 +11,14 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from msgspec import Struct
-from numpy.typing import NDArray
 
 from potto.integrate.columns import distinct
 from potto.integrate.fixed.product_rule import Rule
 from potto.integrate.fixed.regions import LOOSEST, MARGIN, MOST_REGIONS
-from potto.integrate.fixed.straight import Straight
+from potto.integrate.fixed.straight import RowNumbers, Straight
 from potto.integrate.fixed.topologies import Alike
 from potto.integrate.pieces import Evaluator
 from potto.integrate.rules.proved_orders import Cell as Stretch
@@ -59,7 +57,7 @@ class _Proved(Struct, frozen=True):
 
 def proved_rules(
     plan: Straight, exact: Sequence[int | None], machine: Evaluator, env: dict[str, Value], cell: Alike, index: Ints,
-    between: NDArray[np.integer[Any]],
+    between: RowNumbers,
 ) -> tuple[list[tuple[Rule, Ints]], Ints]:  # fmt: skip
     """Rules with the cells that they are for, and the cells for which there are none.
 

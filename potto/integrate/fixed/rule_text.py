@@ -20,9 +20,9 @@ from potto.integrate.rules.gauss import EPS
 from potto.kernels.native.elementary import module
 
 NAME = "rule"
-# Numbers of the frame: how many members, how long the rows of results are, and where; for each variable how many nodes,
-# coefficients and nodes with rounding, then where tables are.
-HEAD, PER_AXIS = 3, 9
+# Numbers of the frame: how many members, how long the rows of results are, and where, how many ends of each stretch are
+# looked at; for each variable how many nodes, coefficients and nodes with rounding, then where tables are.
+HEAD, PER_AXIS = 4, 9
 
 
 class RuleText(FormulaText):
@@ -210,10 +210,11 @@ class RuleText(FormulaText):
             self.raise_to(most, size)
 
     def ends(self, i: int, env: Env, largest: str) -> None:
-        """The largest value at the corners of cells."""
+        """The largest value at the corners of cells, where these are looked at."""
         at, machine = self.at, self.machine.with_directions(0)
+        asked = at.address("%frame", HEAD - 1)
         low, width, _ = self.stretch(i, env, machine, False)
-        j = at.begin("2")
+        j = at.begin(asked)
         node = at.spread(at.once(f"uitofp i64 {j} to double", j))
         here = {**env, self.plan.variables[i]: self.node(low, width, node)}
         if i + 1 == len(self.plan.variables):

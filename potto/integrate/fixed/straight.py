@@ -11,7 +11,9 @@ from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import Any
 
+import numpy as np
 from msgspec import Struct
+from numpy.typing import NDArray
 
 from potto.core.terms import (
     Branch,
@@ -33,6 +35,7 @@ from potto.integrate.rules.complex_enclosures import enclosable
 MOST_VARIABLES, MOST_CUTS, MOST_TERMS = 3, 13, 600
 # Enough for the number of a row in a frame: two bounds, then cuts.
 ROW_BITS = (MOST_CUTS + 1).bit_length()
+RowNumbers = NDArray[np.integer[Any]]  # numbers of rows of frames
 # How many times its rounding a surface must be away from 0, and cuts from each other.
 CLEAR = 64.0
 

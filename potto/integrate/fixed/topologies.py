@@ -18,7 +18,7 @@ from potto.core.terms import Term, children
 from potto.integrate.columns import distinct
 from potto.integrate.fixed.lowered_topologies import Found, lowered_topologies
 from potto.integrate.fixed.moving_sums import evaluated
-from potto.integrate.fixed.straight import CLEAR, Straight, nothing
+from potto.integrate.fixed.straight import CLEAR, RowNumbers, Straight, nothing
 from potto.integrate.fixed.topology_text import FARTHEST
 from potto.integrate.pieces import Evaluator, gather
 from potto.kernels.cells import Array, Bools, Cell, Ints, Number, Value
@@ -37,14 +37,14 @@ class Alike(Struct, frozen=True):
 
     face: Term
     turning: Turning
-    rows: Ints
+    rows: RowNumbers
     members: Ints
 
 
 class _Cells(Struct):
     """Stretches of the variables so far, (N,) each: their rows, whose they are, and numbers, variables at middles."""
 
-    rows: Ints
+    rows: RowNumbers
     members: Ints
     env: dict[str, Value]
 
