@@ -26,24 +26,24 @@ from typing import Any
 import numpy as np
 from msgspec import Struct
 
+from potto.calculus.algebra.degree import plane
 from potto.calculus.decomposition.surface_cuts import Face, Product
-from potto.core.terms import App, Const, Prim, Term, const, function_of, mul, postorder, sub, var
+from potto.core.terms import Term, const, function_of, mul, sub, var
 from potto.integrate.decomposition.cuts import frame_rows
 from potto.integrate.decomposition.meetings import Row, as_array
 from potto.integrate.decomposition.sections import searched_rows
 from potto.integrate.events import UNKNOWN_JUMP
 from potto.integrate.montecarlo.cube_map import Chart, Point, label_of
 from potto.integrate.montecarlo.lines import End, Line, label_name, leaving, line, offset
+from potto.integrate.montecarlo.passages import ASIDE, Passage
 from potto.integrate.montecarlo.pivot_choice import pivots
 from potto.integrate.pieces import Sums, still
 from potto.integrate.plan import Plan
 from potto.integrate.rules.gauss import EPS
 from potto.kernels.cells import Array, Bools, Cell, Mask, Value, pad
-from potto.primitives import PRIMITIVES
 
 # A root that phi's own slope puts further away than this (in labels) is not one that phi passes through smoothly.
 OFF = 1e-6
-ASIDE = 1e-7
 JUMPED = 16.0  # from how many times that on what phi is beside a root, measured by its slope, is no power of it
 ROUNDING = 16 * EPS  # of what crosses at one point
 PLACED = 4 * EPS  # of the place of a point, going through its label
@@ -214,9 +214,8 @@ class Surface(Struct, dict=True):
             steep = np.abs(slopes[j])
             smooth = np.isfinite(slopes).all(axis=0) & (steep > 0) & (np.abs(phi) <= OFF * steep)
             rates = slopes[:k] / (steep * ((slopes[k:] / steep) ** 2).sum(axis=0))
-            if self.breaks:  # at a pole its slope has the sign of neither side
-                low, high, _ = self.around(labels, pivot, marked)
-                smooth &= np.sign(high) - np.sign(low) == 2 * np.sign(slopes[j])
+            if self.passage is not None:  # at a pole its slope has the sign of neither side, where it touches of one
+                smooth &= self.passage.through(labels, pivot, slopes[j], inside & smooth)
         odd = inside & ~smooth
         if odd.any():
             rates = np.where(odd, self.beside(labels, pivot, marked, point, root), rates)
@@ -338,19 +337,10 @@ class Surface(Struct, dict=True):
         return found[0][0], found[1][0], found[1][1]
 
     @cached_property
-    def breaks(self) -> bool:
-        """Whether it may have poles, or jump by itself."""
-        for node in postorder(self.term):
-            match node:
-                case Prim(op="pow", args=(_, Const(value=value))) if value > 0:
-                    continue
-                case Prim(op="div", args=(_, below)) if not below.free:
-                    continue
-                case App():
-                    return True
-                case Prim(op=op) if PRIMITIVES[op].broken:
-                    return True
-        return False
+    def passage(self) -> Passage | None:
+        """What tells whether it is passed through at a point; None of a plane, which always is."""
+        planar = plane(self.term, [level.variable for level in self.chart.plan.levels])
+        return None if planar else Passage(self.chart, self.term, self.number)
 
     def labelled(self, labels: list[Array | None], pivot: int, marked: dict[int, int]) -> dict[str, Value]:
         """What roots along the pivot are written in where bounds follow it."""
