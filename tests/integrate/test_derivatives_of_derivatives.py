@@ -80,3 +80,23 @@ def test_a_formula_that_misses_a_part_is_found_out(monkeypatch: pytest.MonkeyPat
     assert not got.converged and "disagree about the first one" in got.reasons[0]
     short = m.eval("D(D(f))(0.03)")
     assert not short.converged and short.error == float("inf") and "disagree" in short.reasons[0]
+
+
+# An integral with a surface for each value of an index, and its second derivative at t = 0.4.
+INDEXED = [
+    ("[0, 1]", "product i in 1..2 ([x^2 < i*t])", "x", -0.25 * 0.4**-1.5),
+    ("[0, 1]", "product i in 1..2 (1 - [x^2 < i*t]/2)", "x", (1 + 2 * 2**0.5) / 16 * 0.4**-1.5),
+    ("[0, 1]", "fold s = 1 for i in 1..2 (s*[x^2 < i*t])", "x", -0.25 * 0.4**-1.5),
+    ("([0, 1], [0, 1])", "product i in 1..2 ([x + i*y < t])", "x, y", 0.5),
+    ("([0, 1], [0, 1])", "sum i in 1..2 ([i*x + y < t])", "x, y", 1.5),
+    ("([0, 1], [0, 1])", "sum i in 0..2 ([x + i*y < t])", "x, y", 1.5),
+    ("([0, 1], [0, 1])", "sum i in 1..2 (x*delta(i*x + y - t))", "x, y", 1.25),
+]
+
+
+@pytest.mark.parametrize(("bounds", "body", "names", "exact"), INDEXED, ids=[row[1] for row in INDEXED])
+def test_a_surface_for_each_value_of_an_index(bounds: str, body: str, names: str, exact: float) -> None:
+    """For one value of the index a surface is solved for x, for another for y; where one is passed the others hold."""
+    r = potto.hessian(potto.compile(f"def f(t) integral {bounds} ({body}) d({names})").f)(0.4)
+    assert abs(r.value - exact) <= r.error + 1e-14
+    assert r.error < 1e-10

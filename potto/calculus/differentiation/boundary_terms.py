@@ -82,22 +82,40 @@ def at_surfaces(node: Integral, moving: frozenset[str], rate: Rate, folding: boo
                 surfaces.setdefault(normalized_surface(factor)[0], []).append(item)
     terms: list[Term] = []
     met: list[Root] = []
-    zero = zero_like(node.body)
     for surface, members in surfaces.items():
-        sums = loops_over(node.body, members[0])
-        alternatives: list[tuple[Term | None, Term]] = []
         try:
-            for pivot in pivots(node, surface, folding):
-                new = [r for r in pivot.roots if not any(_same(r, other) for other in met)]
-                gains: list[Term] = []
-                for root in new:
-                    gains += _at_root(node, flipping(branches, root.variable, root.at, members), root, rate, sums)
-                met += new
-                alternatives.append((pivot.condition, total(gains, zero)))
-            terms.append(chosen(alternatives))
+            terms += _at_surface(node, surface, members, branches, met, rate, folding)
         except NoClosedForm:
             terms += _over_level_set(node, surface, members, rate)
     return [term for term in terms if not vanishes(term)]
+
+
+def _at_surface(
+    node: Integral, surface: Term, members: Sequence[Branch], branches: list[Branch], met: list[Root], rate: Rate,
+    folding: bool,
+) -> list[Term]:  # fmt: skip
+    """The boundary terms of a surface at its roots, but those already met; under loops each instance of it has a pivot
+    of its own. Raises NoClosedForm."""
+    loops, zero = loops_over(node.body, members[0]), zero_like(node.body)
+    alternatives: list[tuple[Term | None, Term]] = []
+    apart: list[Term] = []
+    earlier: list[Term] = []
+    for pivot in pivots(node, surface, folding):
+        new = [r for r in pivot.roots if not any(_same(r, other) for other in met)]
+        where = earlier if pivot.condition is None else [*earlier, pivot.condition]
+        each = where if any(loop.variable in term.free for loop in loops for term in where) else []
+        gains: list[Term] = []
+        for root in new:
+            flips = flipping(branches, root.variable, root.at, members)
+            gains += _at_root(node, flips, root, rate, loops, each)
+        met += new
+        if each:
+            apart += gains
+        else:
+            alternatives.append((pivot.condition, total(gains, zero)))
+        if pivot.condition is not None:
+            earlier = [*earlier, prim("not", pivot.condition)]
+    return [*apart, chosen(alternatives)] if alternatives else apart
 
 
 def _over_level_set(node: Integral, surface: Term, members: Sequence[Branch], rate: Rate) -> Iterator[Term]:
@@ -131,7 +149,10 @@ def _guards(at: Term) -> list[Term]:
     return [n.surface for n in postorder(at) if isinstance(n, Branch) and n.orelse is NAN]
 
 
-def _at_root(node: Integral, flips: Flips, root: Root, rate: Rate, sums: list[Loop]) -> Iterator[Term]:
+def _at_root(
+    node: Integral, flips: Flips, root: Root, rate: Rate, sums: list[Loop], where: Sequence[Term]
+) -> Iterator[Term]:
+    """What is gained at a root, for those instances of it for which some conditions hold."""
     speed = rate(root.at)
     if speed is ZERO:
         return
@@ -144,6 +165,8 @@ def _at_root(node: Integral, flips: Flips, root: Root, rate: Rate, sums: list[Lo
     gain = between(root.at, lo, hi, gain)
     if root.index is not None and root.counts is not None:
         gain = sum_(root.index, *root.counts, gain)
+    if where:
+        gain = if_(conjunction(where), gain, zero_like(gain))
     gain = substitute(gain, instances)
     for old in sums:
         gain = sum_(_name(instances[old.variable]), *_ends(old, instances), gain)
@@ -185,7 +208,9 @@ def _fall(body: Term, flips: Flips, sums: list[Loop], instances: Mapping[str, Te
 
         def change(node: Term, new: Term) -> Term:
             if isinstance(node, Branch) and node in signs and isinstance(new, Branch):
-                return if_(here, side_of(substitute(signs[node], instances), new.then, new.orelse, box), new)
+                # Asked there it would be 0: so it is another number there, and not another branch beside it.
+                sign = side_of(substitute(signs[node], instances), ONE, neg(ONE), box)
+                return branch((if_(here, sign, new.surface),), new.strict, new.then, new.orelse)
             return new
 
         return transform(body, change)

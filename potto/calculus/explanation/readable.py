@@ -13,7 +13,7 @@ from math import gcd, isfinite, isqrt, lcm, prod, ulp
 
 from msgspec import Struct
 
-from potto.calculus.algebra.ranges import range_of
+from potto.calculus.algebra.ranges import Range, range_of
 from potto.calculus.algebra.rational_form import Rational, normal
 from potto.calculus.explanation.brackets import bracket as bracket_of
 from potto.calculus.explanation.brackets import conditions, fewer, opposite, sided
@@ -25,6 +25,7 @@ from potto.core.terms import (
     ZERO,
     Branch,
     Const,
+    If,
     Integral,
     Prim,
     Term,
@@ -32,6 +33,7 @@ from potto.core.terms import (
     branch,
     children,
     const,
+    if_,
     mul,
     neg,
     postorder,
@@ -130,12 +132,17 @@ def _undecided(node: Term, known: Mapping[Term, Term], box: Box, work: _Work) ->
     parts = children(node)
     new = rebuild(node, tuple(known[part] for part in parts)) if parts else node
     if isinstance(new, Branch):
-        bounds = range_of(new.surface, box)
-        if bounds.positive or (not new.strict and bounds.lo >= 0):
-            return new.then
-        if bounds.negative or (new.strict and bounds.hi <= 0):
-            return new.orelse
+        taken = _taken(new, range_of(new.surface, box))
+        if taken is not None:
+            return taken
     return new if new is node else work.node(new)
+
+
+def _taken(node: Branch, bounds: Range) -> Term | None:
+    """The side of a branch whose surface has these bounds, where they tell."""
+    if bounds.positive or (not node.strict and bounds.lo >= 0):
+        return node.then
+    return node.orelse if bounds.negative or (node.strict and bounds.hi <= 0) else None
 
 
 class _Work:
@@ -154,6 +161,10 @@ class _Work:
                     self.progress.pause()
                     self.progress.known[key] = self._shortest(node)
                 return self.progress.known[key]
+            case Branch(coordinates=(If(condition=here, then=side, orelse=surface),)):
+                taken = _taken(node, range_of(side))
+                return node if taken is None else if_(here, taken, self.node(
+                    branch((surface,), node.strict, node.then, node.orelse)))  # fmt: skip
             case Branch():
                 known = conditions(node)
                 if known is not None:
