@@ -7,8 +7,23 @@ from contextlib import contextmanager
 from threading import get_ident
 from typing import Any, TypeVar, cast
 
-from potto.query.engine import Engine, drop
-from potto.query.nodes import FOREVER, GONE, MISSING, Cancelled, Event, Input, Memo, Node, Parted, Query, entry_of, same
+from potto.query.engine import Engine
+from potto.query.nodes import (
+    FOREVER,
+    GONE,
+    MISSING,
+    Cancelled,
+    Event,
+    Input,
+    Memo,
+    Node,
+    Parted,
+    Query,
+    drop,
+    entry_of,
+    renew,
+    same,
+)
 
 K = TypeVar("K")
 V = TypeVar("V")
@@ -46,7 +61,7 @@ class Database(Engine):
                 self._last_changed[level] = self.revision
             old.durability = durability
             if differs:
-                old.value, old.changed_at = value, self.revision
+                renew(old, value, self.revision, self.revision - 1)
                 self._changes[self.revision].add(old)
                 self._log("input", "input", (key,))
             return differs

@@ -27,6 +27,8 @@ from potto.query.nodes import (
     Memo,
     Node,
     Query,
+    drop,
+    has_returned,
     short,
 )
 
@@ -141,7 +143,10 @@ class Engine:
         first.
 
         Nodes are checked in the order in which they were read. One is looked at only if all those before it stand;
-        otherwise the query might not read it any more.
+        otherwise the query might not read it any more. What has come back stands, but is seen here alone, where all
+        that the memo read is up to date: were it seen in the leaves (`_stands`), what lies between might be of another
+        time. Members of a cycle, which have been seen at different times, must run together or stand together: for
+        them it counts as changed.
         """
         revision, since, last_changed = self.revision, memo.verified_at, self._last_changed
         stands: bool | Memo = last_changed[memo.durability] <= since
@@ -167,7 +172,7 @@ class Engine:
                     else:
                         places[-1] = place
                         return source
-                if dep.changed_at > since:
+                if dep.changed_at > since and (memo.cyclic or not has_returned(dep, since)):
                     return True
             for dep in deps:
                 if dep.durability < durability:
@@ -376,16 +381,5 @@ class Engine:
         inside = set(members)
         outside = dict.fromkeys(dep for member in members for dep in member.deps if dep.source not in inside)
         for member in members:
-            member.provisional = False
+            member.provisional, member.cyclic = False, True
             self._depend(member, outside)
-
-
-def drop(table: dict[tuple[Hashable, ...], Memo], memos: list[Memo]) -> int:
-    """Remove memos from their table and free their values. Their readers can still be verified through what these had
-    read."""
-    dropped = 0
-    for memo in memos:
-        if memo.index < 0 and not memo.provisional and table.pop(memo.args, None) is not None:
-            memo.value, memo.entries = GONE, None
-            dropped += 1
-    return dropped

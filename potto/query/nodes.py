@@ -66,13 +66,26 @@ class Query:
         self.travels, self.cuts = travels, cuts
 
 
-class Input:
-    """A value from outside. Its `source` is None, since it needs no verification."""
+class Former:
+    """A value that a node had, and the first and the last revision for which it was known to be right. Whoever read
+    the node between these read that value."""
 
-    __slots__ = ("changed_at", "durability", "source", "value")
+    __slots__ = ("first", "last", "value")
+
+    def __init__(self, value: Any, first: int, last: int) -> None:
+        self.value, self.first, self.last = value, first, last
+
+
+class Input:
+    """A value from outside. Its `source` is None, since it needs no verification. `former` and `again` are as those of
+    a memo."""
+
+    __slots__ = ("again", "changed_at", "durability", "former", "source", "value")
 
     def __init__(self, value: Any, changed_at: int, durability: int) -> None:
         self.value, self.changed_at, self.durability = value, changed_at, durability
+        self.former: Former | None = None
+        self.again: Former | None = None
         self.source: None = None
 
 
@@ -80,14 +93,19 @@ class Memo:
     """The answer of a query for its arguments.
 
     `index` is its place on the stack of running queries, or -1. `low` is the lowest place that it reaches through a
-    cycle. `cyclic`: a cycle leads back to it. `provisional`: it has finished, but its cycle has not.
+    cycle. `cyclic`: it is part of a cycle; while it runs, one leads back to it. `provisional`: it has finished, but its
+    cycle has not.
 
     `leaves` are the nodes of durability 0 that it depends on in the end: inputs, entries of tables, and memos known or
     declared to absorb most edits (`cuts`). The memo stands as long as no leaf and nothing durable changes. None if
     there are too many, or if they are not known. `found` collects everything below many leaves, once it was needed.
+
+    `former` is the value before this one; `again` says when it had this one before, if it has come back. A mistake is
+    mended, an edit is taken back: then all that was not asked for meanwhile stands.
     """
 
     __slots__ = (
+        "again",
         "args",
         "changed_at",
         "cuts",
@@ -95,6 +113,7 @@ class Memo:
         "deps",
         "durability",
         "entries",
+        "former",
         "found",
         "index",
         "leaves",
@@ -114,6 +133,8 @@ class Memo:
         self.cuts = query.cuts
         self.verified_at, self.changed_at, self.durability = -1, -1, 0
         self.entries: dict[Any, Entry] | None = None
+        self.former: Former | None = None
+        self.again: Former | None = None
         self.index, self.low, self.cyclic, self.provisional = -1, 0, False, False
         self.source = self
 
@@ -128,33 +149,35 @@ class Memo:
         old, entries = self.value, self.entries or {}
         if self.changed_at >= 0:
             changes.add(self)
-        self.value, self.changed_at = value, revision
+        renew(self, value, revision, self.verified_at)
         changed: Iterable[Any] = entries
         if isinstance(value, Parted) and isinstance(old, Parted):
             changed = value.may_differ(old) & entries.keys()
         for key in changed:
             entry, new = entries[key], value.get(key)
             if not same(entry.value, new):
-                entry.value, entry.changed_at = new, revision
+                renew(entry, new, revision, self.verified_at)
                 changes.add(entry)
 
     def put_error(self, durability: int, revision: int, changes: set[Node]) -> None:
         """The query failed: its next value counts as changed."""
-        self.value, self.verified_at, self.changed_at = GONE, -1, revision
+        self.value, self.verified_at, self.changed_at, self.again = GONE, -1, revision, None
         self.deps, self.leaves, self.durability = (), None, durability
         changes.add(self)
         for entry in (self.entries or {}).values():
-            entry.value, entry.changed_at = GONE, revision
+            entry.value, entry.changed_at, entry.again = GONE, revision, None
             changes.add(entry)
 
 
 class Entry:
     """One key of a query whose value is a mapping. It changes only when the value under that key does."""
 
-    __slots__ = ("changed_at", "key", "source", "value")
+    __slots__ = ("again", "changed_at", "former", "key", "source", "value")
 
     def __init__(self, source: Memo, key: Any) -> None:
         self.source, self.key, self.value, self.changed_at = source, key, source.value.get(key), source.changed_at
+        self.former: Former | None = None
+        self.again: Former | None = None
 
     @property
     def durability(self) -> int:
@@ -205,6 +228,23 @@ Node = Input | Memo | Entry
 Leaf = Node
 
 
+def renew(node: Node, value: Any, revision: int, seen: int) -> None:
+    """Give a node another value. `seen` is the last revision for which the one that it has was right."""
+    old, former, seen = node.value, node.former, min(seen, revision - 1)
+    node.again = None
+    if former is not None and same(former.value, value):
+        node.again, value = former, former.value
+    if old is not GONE and old is not MISSING and node.changed_at <= seen:
+        node.former = Former(old, node.changed_at, seen)
+    node.value, node.changed_at = value, revision
+
+
+def has_returned(node: Node, revision: int) -> bool:
+    """Whether a node that has changed since a revision has the value again that it had then."""
+    again = node.again
+    return again is not None and again.first <= revision <= again.last
+
+
 def same(old: Any, new: Any) -> bool:
     """Whether two values are equal, so that nothing has changed."""
     if old is new:
@@ -213,6 +253,17 @@ def same(old: Any, new: Any) -> bool:
         return bool(old == new)
     except RecursionError:  # nested too deeply for `==`; running the reader once more is always right
         return False
+
+
+def drop(table: dict[tuple[Hashable, ...], Memo], memos: list[Memo]) -> int:
+    """Remove memos from their table and free their values. Their readers can still be verified through what these had
+    read."""
+    dropped = 0
+    for memo in memos:
+        if memo.index < 0 and not memo.provisional and table.pop(memo.args, None) is not None:
+            memo.value, memo.entries, memo.former = GONE, None, None
+            dropped += 1
+    return dropped
 
 
 def short(value: object) -> str:

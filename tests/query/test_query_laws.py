@@ -145,6 +145,17 @@ def test_incremental_is_from_scratch_with_failures_and_tables(steps: list[tuple[
     run(steps, fails)
 
 
+@given(st.lists(st.tuples(st.integers(0, 3), st.integers(0, 2)), min_size=20, max_size=30), st.booleans())
+@settings(max_examples=120, deadline=None)
+def test_incremental_is_from_scratch_where_values_come_back(steps: list[tuple[int, int]], two: bool) -> None:
+    """A chain of three over an input with few values, asked for at different places of it."""
+    script: list[tuple[object, ...]] = [("reads", 0, (("input", 0), ("input", 1)), 0)]
+    script += [("reads", node, (("node", node - 1),), 0) for node in (1, 2)]
+    for number, (value, node) in enumerate(steps):
+        script += [("value", number % 2 if two else 0, value, 0), ("ask", node)]
+    run(script, acyclic)
+
+
 @given(st.lists(reads(NODES), min_size=NODES, max_size=NODES), st.permutations(range(NODES)))
 @settings(max_examples=150, deadline=None)
 def test_a_cycle_has_the_same_values_wherever_it_is_entered(
@@ -218,21 +229,19 @@ def test_asking_twice_runs_nothing(steps: list[tuple[object, ...]]) -> None:
                 state.set(db, (what, index), value, int(str(durability)))
 
 
-@given(script(cycles=False), st.integers(0, NODES - 1), st.integers(0, INPUTS - 1))
+@given(script(cycles=False), st.integers(0, INPUTS - 1))
 @settings(max_examples=100, deadline=None)
-def test_a_value_set_back_changes_no_answer_and_runs_only_its_readers(
-    steps: list[tuple[object, ...]], node: int, index: int
-) -> None:
+def test_a_value_set_back_changes_no_answer_and_runs_nothing(steps: list[tuple[object, ...]], index: int) -> None:
     db, state = Database(), State()
     for step in steps:
         match step:
             case ("reads" | "value" as what, number, value, durability):
                 state.set(db, (what, number), value, int(str(durability)))
-    before = [acyclic(db, n) for n in range(NODES)]
     value = db.get_input(("value", index), 0)
+    db.set_input(("value", index), value)
+    before = [acyclic(db, n) for n in range(NODES)]
     db.set_input(("value", index), value + 1)
     db.set_input(("value", index), value)
     with db.recording() as events:
         assert [acyclic(db, n) for n in range(NODES)] == before
-    readers = {n for n in range(NODES) if ("input", index) in db.get_input(("reads", n), ())}
-    assert {event.args[0] for event in events if event.kind == "executed"} <= readers
+    assert [event for event in events if event.kind == "executed"] == []
