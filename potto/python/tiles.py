@@ -118,7 +118,8 @@ def in_tiles(
     return batch.shaped(_Tiles(count, here, task, key).run(None if function._world._held else executor()))
 
 
-_sizes: dict[Any, int] = {}  # of blocks, for functions called before
+# Of blocks, for functions called before, and whether larger ones would take too long; else the batch was small.
+_sizes: dict[Any, tuple[int, bool]] = {}
 
 
 class _Tiles(Struct):
@@ -146,7 +147,7 @@ class _Tiles(Struct):
         return self.estimate()
 
     def _all(self, pool: Executor | None, told: Callable[[float, int], None]) -> None:
-        size = _sizes.get(self.key) or self._size()
+        size = self._size()
         self.blocks = list(_parts(self.count, size))
         for number, block in enumerate(self.blocks):
             if block[0] not in self.done:
@@ -158,22 +159,24 @@ class _Tiles(Struct):
         return None
 
     def _size(self) -> int:
-        """The size of blocks, by trying; one that was taken is done."""
-        size = tried = PILOT
-        while 2 * size <= self.count and size < MOST:
+        """The size of blocks, by trying where it is not known; one that was taken is done."""
+        size, most = _sizes.get(self.key, (PILOT, False))
+        tried = size
+        while not most and 2 * size <= self.count and size < MOST:
             self._alone((0, size))
             if ENOUGH <= self.spent < COLD:
                 self._alone((0, size))
-            if self.spent >= ENOUGH:
+            most = self.spent >= ENOUGH
+            if most:
                 break
             tried, size = size, min(size * (64 if self.spent < LITTLE else 2), MOST)
             self.done.clear()
-        else:  # twice as many take less than twice ENOUGH, and so may all
+        if not most and self.spent:  # twice as many take less than twice ENOUGH, and so may all
             while size < self.count and size < MOST and self.spent * self.count <= 2 * ENOUGH * tried:
                 size *= 2
         if len(_sizes) > MOST_SIZES:
             _sizes.clear()
-        _sizes[self.key] = size
+        _sizes[self.key] = size, most
         return size
 
     def _alone(self, block: Part) -> Estimate:

@@ -176,6 +176,12 @@ def test_tuples_and_the_least_batches(module: Any) -> None:
     assert "blocks" not in module.pair(X[: tiles.LEAST - 1]).stats
 
 
+def test_a_large_batch_is_not_held_to_the_blocks_of_a_small_one(module: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where nothing takes long, a batch is one block, whatever was asked before."""
+    monkeypatch.setattr(tiles, "ENOUGH", 1e9)
+    assert [module.pair(np.linspace(0, 1, count)).stats["blocks"] for count in (2100, 9000, 2100)] == [1, 1, 1]
+
+
 def test_an_interrupt_keeps_what_is_done(module: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     whole, alone = module.plain(X, T), tiles._Tiles._alone
 

@@ -18,6 +18,7 @@ from potto.core.terms import Integral
 from potto.integrate.events import Degenerate, Events, Fold, Shortfall, TwoSided, Unsearched
 from potto.integrate.pieces import Sums
 from potto.kernels.cells import Array, Bools, Ints
+from potto.kernels.memory import kept
 from potto.runtime.answers.convergence import missing, rounded
 from potto.runtime.evaluation.beside import one_direction
 from potto.runtime.integration.attempts import proved_beforehand
@@ -64,6 +65,7 @@ def added_up(sums: Sums) -> Array:
 
 def by_members(problem: Problem, settled: Settled) -> Sums:
     """The sums of a batch: whole boxes first, which need nothing more, then the others."""
+    kept()
     plan = problem.plan(next(iter(preferred(problem))))
     boxes = whole_boxes(plan, problem.machine, problem.env, problem.batch)
     if boxes is None:
