@@ -44,6 +44,7 @@ from potto.core.terms import (
     postorder,
     prim,
     substitute,
+    with_integrand,
 )  # fmt: skip
 from potto.integrate.fixed.boxes import Box, box_of
 from potto.integrate.fixed.straight import Straight, straight
@@ -227,8 +228,9 @@ def make(
     for some of the parameters, or nan. `outlines`: of the program; they grow.
     """
     asked = _Asked(resolve, decide)
-    if placed_along(term) is not None:
-        term = split_at_bounds(term, inline)  # while the level set still stands in it
+    if placed_along(term) is not None:  # while the level set still stands in it
+        term = with_integrand(term, unrolled(term.body, inline, asked.remember) or term.body)
+        term = split_at_bounds(term, inline)
     over = placed_along(term)
     if over is not None:
         term = integral(term.variables, term.bounds, over.weight, term.hints)

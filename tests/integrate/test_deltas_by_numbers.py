@@ -5,6 +5,7 @@ Answers by mpmath: the roots by bisection, derivatives by its central difference
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -142,3 +143,59 @@ def test_a_section_that_is_nowhere_divides_by_nothing(body: str, order: str) -> 
     found = potto.deriv(f)((0.0, 1.0))
     assert abs(found.value - 0.03 * mp.pi) <= found.error + 1e-15 <= 1e-9
     assert abs(found.tangent) <= found.tangent_error <= 1e-9 and found.converged
+
+
+# A delta on a surface that a loop makes, and what it comes to at t = 0.4, its derivative with it.
+LOOPS = [
+    ("t - (sum i in 1..n (i*x))", 1 / 6, 0.0),
+    ("t - (sum i in 1..2 (i*x^2))", 1 / (2 * math.sqrt(3 * 0.4)), -1 / (4 * math.sqrt(3) * 0.4**1.5)),
+    ("t - (fold s = x for i in 1..2 (s*2 + x))", 1 / 7, 0.0),
+    ("t - (product i in 1..2 (i*x))", 1 / math.sqrt(8 * 0.4), -1 / (2 * math.sqrt(8) * 0.4**1.5)),
+]
+
+
+@pytest.mark.parametrize(("surface", "value", "slope"), LOOPS, ids=[row[0] for row in LOOPS])
+def test_a_surface_that_a_loop_makes(surface: str, value: float, slope: float) -> None:
+    m = potto.compile(
+        f"def f(t, n) integral [0, 1] delta({surface}) d(x)\ndef g(t, n) integral [0, 1] [{surface} > 0] d(x)"
+    )
+    r = potto.deriv(m.f)((0.4, 1.0), (3, 0.0))
+    assert abs(r.value - value) <= r.error + 1e-15 and r.error < 1e-12
+    assert abs(r.tangent - slope) <= r.tangent_error + 1e-15 and r.tangent_error < 1e-11
+    twice = potto.hessian(m.g, wrt=["t"])(0.4, 3)
+    assert abs(twice.value - slope) <= twice.error + 1e-15 and twice.error < 1e-11
+
+
+@pytest.mark.parametrize("method", ["quadrature", "qmc"])
+def test_all_of_many_roots_count(method: str) -> None:
+    """955 of them, searched for; the same ones by bisection between points of a grid."""
+    x, n, t = np.linspace(0, 1, 100_001), 3000, 0.3
+    here = np.nonzero(np.diff(np.sign(np.sin(n * x) + x - t)))[0]
+    low, high = x[here], x[here + 1]
+    rises = np.sin(n * low) + low < t
+    for _ in range(60):
+        middle = (low + high) / 2
+        before = (np.sin(n * middle) + middle < t) == rises
+        low, high = np.where(before, middle, low), np.where(before, high, middle)
+    exact = np.sum(1 / np.abs(n * np.cos(n * low) + 1))
+    text = (
+        f"def f(t) integral [0, 1] [sin({n}*x) + x < t] d(x)\ndef g(t) integral [0, 1] delta(sin({n}*x) + x - t) d(x)"
+    )
+    m = potto.compile(text)
+    with potto.settings(method=method, samples=256):
+        r = potto.deriv(m.f)((t, 1.0))
+        assert abs(r.tangent - exact) <= r.tangent_error + 1e-14 and r.tangent_error < 1e-9
+    if method == "quadrature":
+        assert abs(m.g(t) - exact) <= m.g(t).error + 1e-14
+
+
+def test_the_second_derivative_where_roots_go_on_without_end() -> None:
+    """Phi(c/t) for the ends c of the stretches in which a cosine is less than 0.3."""
+    t, c = 1.1, math.acos(0.3)
+    exact = 0.0
+    for k in range(20):
+        for end, sign in ((2 * math.pi * k + c, -1), (2 * math.pi * (k + 1) - c, 1)):
+            exact += 2 * sign * math.exp(-((end / t) ** 2) / 2) * (2 * end / t**3 - end**3 / t**5)
+    f = potto.compile("def f(t) integral [-inf, inf] exp(-x^2/2)*[cos(x*t) < 0.3] d(x)").f
+    r = potto.hessian(f)(t)
+    assert abs(r.value - exact) <= r.error + 1e-14 and r.error < 1e-10

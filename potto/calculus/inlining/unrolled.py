@@ -15,6 +15,7 @@ from potto.core.binders import apart
 from potto.core.terms import (
     App,
     Branch,
+    Delta,
     Deriv,
     Fold,
     If,
@@ -66,9 +67,9 @@ class _Unrolling:
         deciding = {
             part
             for node in postorder(term)
-            if isinstance(node, Branch)
-            for part in postorder(node.surface)
-            if isinstance(part, Sum)
+            if isinstance(node, Branch | Delta)
+            for part in postorder(node.coordinates[0])
+            if isinstance(part, Sum | Fold)
         }
         for node in postorder_by(term, lambda node: self.below(node, taken)):
             if node in taken:
@@ -100,7 +101,7 @@ class _Unrolling:
             return self.applied(node, depth)
         if isinstance(node, Sum) and (decides or any(isinstance(part, App | Branch) for part in postorder(node.body))):
             return self.summed(node, depth)
-        if isinstance(node, Fold) and any(isinstance(part, App | Branch) for part in postorder(node.body)):
+        if isinstance(node, Fold) and (decides or any(isinstance(part, App | Branch) for part in postorder(node.body))):
             return self.stepped(node, depth)
         return node
 

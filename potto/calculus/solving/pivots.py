@@ -106,7 +106,7 @@ def _family(node: Integral, position: int, family: Family) -> Root:
     ends = [substitute(family.inner, {name: end}) for end in (lo, hi)]
     if family.stops:
         ends += [substitute(family.inner, {name: _within(stop, lo, hi)}) for stop in family.stops]
-    if any(abs(range_of(end).lo) == math.inf and range_of(end).lo == range_of(end).hi for end in ends):
+    if any(map(_infinite, ends)) or any(not _finite(b) and _unbounded(e) for b, e in zip((lo, hi), ends, strict=False)):
         raise NoClosedForm(f"there are infinitely many roots in `{name}`")
     ends = _corners(node, position, ends)
     lowest, highest = _extreme("min", ends), _extreme("max", ends)
@@ -130,6 +130,14 @@ def _corners(node: Integral, position: int, ends: list[Term]) -> list[Term]:
 
 def _finite(bound: Term) -> bool:
     return not (isinstance(bound, Const) and abs(bound.value) == float("inf"))
+
+
+def _infinite(end: Term) -> bool:
+    return _unbounded(end) and range_of(end).lo == range_of(end).hi
+
+
+def _unbounded(end: Term) -> bool:
+    return max(abs(range_of(end).lo), abs(range_of(end).hi)) == math.inf
 
 
 def _whole(op: str, end: Term, otherwise: float) -> Term:

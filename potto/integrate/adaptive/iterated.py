@@ -244,7 +244,8 @@ class Iteration(Struct):
         number = next((n for n, own in enumerate(self.plan.levels) if own is level), None)
         near = None if number is None else concentrated(self.plan, number, env, lo, hi, batch)
         lo, hi, lost = near or (lo, hi, None)
-        rows = searched_rows(level, env, lo, hi, batch, machine)
+        summed = self.plan.over is not None and level is self.plan.levels[-1]
+        rows = searched_rows(level, env, lo, hi, batch, machine, summed)
         return (rows + critical_rows(level, env, lo, hi, batch, machine) if critical else rows), lost
 
     def sides_of(self, scene: Scene, seg: Segments) -> Settled:

@@ -37,14 +37,17 @@ LEVEL = 1e-9  # a slope that is such a part of that beside it is none
 BESIDE = 2.0**-27  # how far from a pole, as a part of where it is, it is asked how it moves
 
 
-def searched_rows(level: LevelPlan, env: dict[str, Value], lo: Cell, hi: Cell, batch: int, machine: Any) -> list[Row]:
-    """The candidate cuts of one variable beyond the closed-form ones."""
+def searched_rows(
+    level: LevelPlan, env: dict[str, Value], lo: Cell, hi: Cell, batch: int, machine: Any, summed: bool = False
+) -> list[Row]:
+    """The candidate cuts of one variable beyond the closed-form ones. summed: what is integrated is a sum over them, so
+    that each counts as those do at which something jumps."""
     rows: list[Row] = []
     for number, family in level.families:
         rows += _family(level, number, family, env, lo, hi, batch, machine)
     low, high = as_array(np.minimum(lo.v, hi.v), batch), as_array(np.maximum(lo.v, hi.v), batch)
     for cut in level.searched:
-        along = _Along(level.level.cuts.index(cut), cut.decides, cut.surface, level.variable, env, machine)
+        along = _Along(level.level.cuts.index(cut), cut.decides or summed, cut.surface, level.variable, env, machine)
         rows += along.searched(low, high)
     return rows
 

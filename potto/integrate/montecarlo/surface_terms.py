@@ -194,7 +194,7 @@ class Surface(Struct, dict=True):
         values = machine.tracking().evaluate(along.plan.frame, {p: point.env[p] for p in along.plan.frame.params}, None)
         assert isinstance(values, tuple)
         lo, hi, rows = frame_rows(along.plan, values)
-        return lo, hi, rows + searched_rows(along.plan, point.env, lo, hi, n, machine), weight
+        return lo, hi, rows + searched_rows(along.plan, point.env, lo, hi, n, machine, summed=True), weight
 
     def at(
         self, labels: list[Array | None], pivot: int, inside: Bools, off: Array, root: Term | None
