@@ -285,17 +285,21 @@ def _substitute_sources(sources: Sources, values: dict[Source, Value]) -> Source
 
 
 def _substitute_scalar(value: Scalar, values: dict[Source, Value]) -> Value:
-    jumps = set(_surfaces(value.jumps, values))
-    spikes = {Spike(_surface(spike.over, values), "") for spike in value.spikes}
+    jumps, spikes = value.jumps, value.spikes
+    if jumps:
+        jumps = frozenset(_surfaces(jumps, values))
+    if spikes:
+        spikes = frozenset(Spike(_surface(spike.over, values), "") for spike in spikes)
     for source in value.sources:
         actual = values.get(source)
         if isinstance(actual, Scalar):
-            jumps |= actual.jumps
-            spikes |= actual.spikes
+            jumps, spikes = jumps | actual.jumps, spikes | actual.spikes
+    if not value.carriers:
+        return Scalar(_substitute_sources(value.sources, values), jumps, spikes)
     carried = [values[source] for source in value.carriers if source in values]
     plain = {s: trail for s, trail in value.sources.items() if s not in value.carriers or s not in values}
     carriers = frozenset(source for source in value.carriers if source not in values)
-    base = Scalar(_substitute_sources(plain, values), frozenset(jumps), frozenset(spikes), carriers)
+    base = Scalar(_substitute_sources(plain, values), jumps, spikes, carriers)
     if not carried:
         return base
     whole = joined(carried)

@@ -367,6 +367,8 @@ class _Filling:
 
     def _give(self, place: int, expected: Type, name: str | None) -> None:
         """Check that an argument fits what is expected of it, by the parameter of this name if it has one."""
+        if self.types[place] is REAL is expected:  # as it is mostly
+            return
         expr = self.node.arguments[place].value
         if not self.spread and stands_still(self.inference, self.node, expr, expected):
             self.inference.still.add(id(expr))

@@ -8,8 +8,7 @@ names in scope, what is to be looked at once everything else is known, and the d
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from typing import Any, Literal, NamedTuple, TypeVar
 
 from potto.diagnostics import Diagnostic
@@ -222,19 +221,13 @@ class Inference:
         """Whether the definition refers to one of its own group."""
         return any(isinstance(meaning, Member) for meaning in self.meanings.values())
 
-    @contextmanager
-    def loop(self) -> Iterator[None]:
+    def loop(self) -> Reaching:
         """What indices reach in a loop is forgotten behind it."""
-        around = self.reaches
-        yield
-        self.reaches = around
+        return Reaching(self, self.reaches)
 
-    @contextmanager
-    def at_times(self) -> Iterator[None]:
+    def at_times(self) -> Reaching:
         """In what may not be evaluated each time that a loop turns."""
-        with self.loop():
-            self.reaches = {}
-            yield
+        return Reaching(self, {})
 
     # Fitting
 
@@ -333,6 +326,21 @@ class Inference:
         checks, self._late = self._late, []
         for check in checks:
             check()
+
+
+class Reaching:
+    """A block in which indices are known to reach something, which is forgotten behind it."""
+
+    __slots__ = ("_around", "_inference", "_inside")
+
+    def __init__(self, inference: Inference, inside: dict[int, Reach]) -> None:
+        self._inference, self._inside, self._around = inference, inside, inference.reaches
+
+    def __enter__(self) -> None:
+        self._inference.reaches = self._inside
+
+    def __exit__(self, *raised: object) -> None:
+        self._inference.reaches = self._around
 
 
 quick(Plan, Part, Reach, _Pending)

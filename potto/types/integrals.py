@@ -57,6 +57,9 @@ def _bounds(inference: Inference, node: nodes.Integral, place: int, bounds: Boun
     inside = [name for name in later if not (inference.scope.find(name) or inference.outside.find(None, name))]
     parts = (bounds.lo, bounds.hi) if isinstance(bounds, nodes.Interval) else bounds.arguments
     for part in parts:
+        if isinstance(part, nodes.Number):
+            inference.types[id(part)] = REAL
+            continue
         inner = _inner_name(part, inside)
         with inference.scope.inside():
             if inner is not None:

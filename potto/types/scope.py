@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
+from functools import cache
 from typing import Literal
 
 from potto.diagnostics import Diagnostic, Related, Replacement, Suggestion
@@ -96,8 +97,13 @@ class Outside:
     def find(self, path: str | None, name: str) -> Meaning | None:
         found = self.known.get((path, name))
         if found is None and path is None and is_builtin(name):
-            return Builtin(name)
+            return _builtin(name)
         return found
+
+
+@cache
+def _builtin(name: str) -> Builtin:
+    return Builtin(name)
 
 
 def builtin_names() -> tuple[str, ...]:

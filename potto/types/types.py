@@ -235,6 +235,8 @@ def place_of(name: str) -> int | None:
 
 def holds_functions(type: Type) -> bool:
     """Whether it is a function, or a tuple or array in which there is one."""
+    if isinstance(type, Real):
+        return False
     match resolve(type):
         case Function() | Diffeo():
             return True

@@ -40,6 +40,8 @@ MAX_LEAVES = 4096  # numbers in one tuple: beyond it a program is wrong (or host
 
 def unify(a: Type, b: Type) -> bool:
     """Whether the types fit; makes them equal."""
+    if a is b:  # as numbers mostly are
+        return True
     a, b = _reduced(a), _reduced(b)
     if a is b or isinstance(a, Unknown) or isinstance(b, Unknown):
         return True
@@ -156,6 +158,8 @@ def occurs(meta: Meta, type: Type) -> bool:
 
 def parts(type: Type) -> tuple[Type, ...]:
     """The types that a type is made of."""
+    if isinstance(type, Real):  # most types
+        return ()
     if isinstance(type, TupleOf):
         return type.items
     if isinstance(type, Function):
@@ -167,6 +171,8 @@ def parts(type: Type) -> tuple[Type, ...]:
 
 def rebuild(type: Type, leaf: Callable[[Type], Type]) -> Type:
     """A type with every part that is no composite replaced by `leaf` of it."""
+    if isinstance(type, Real):  # most parts
+        return leaf(type)
     type = resolve(type)
     if isinstance(type, Function):
         parameters = tuple([Parameter(p.name, rebuild(p.type, leaf)) for p in type.parameters])
@@ -216,11 +222,13 @@ def open_type(type: Type, level: int) -> Type:
     fresh: dict[str, Type] = {}
 
     def leaf(part: Type) -> Type:
+        if isinstance(part, NUMBERS):
+            return REAL
         if isinstance(part, Var):
             return fresh.setdefault(part.name, Meta(level))
         if isinstance(part, SizeVar):
             return fresh.setdefault(f"[{part.name}]", Meta(level, size=part.name))
-        return REAL if isinstance(part, NUMBERS) else part
+        return part
 
     return rebuild(type, leaf)
 

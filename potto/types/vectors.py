@@ -24,6 +24,7 @@ from potto.types.types import (
     Count,
     Diffeo,
     Meta,
+    Real,
     TupleOf,
     Type,
     Unknown,
@@ -38,6 +39,8 @@ _RIGHT = {op: f"the right of `{op}`" for op in "+-*/"}
 
 def is_vector(type: Type) -> bool:
     """Whether there is arithmetic on a value component by component; a dual is taken apart instead."""
+    if isinstance(type, Real):
+        return False
     found = resolve(type)
     return isinstance(found, ArrayOf) or (isinstance(found, TupleOf) and not found.dual and found.record is None)
 
