@@ -179,6 +179,7 @@ def test_tuples_and_the_least_batches(module: Any) -> None:
 def test_a_large_batch_is_not_held_to_the_blocks_of_a_small_one(module: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     """Where nothing takes long, a batch is one block, whatever was asked before."""
     monkeypatch.setattr(tiles, "ENOUGH", 1e9)
+    monkeypatch.setattr(tiles, "LITTLE", 0.0)
     assert [module.pair(np.linspace(0, 1, count)).stats["blocks"] for count in (2100, 9000, 2100)] == [1, 1, 1]
 
 
