@@ -27,7 +27,7 @@ from potto.integrate.costs import counting, wanted
 from potto.kernels.cells import Value, all_arrays, map_arrays
 from potto.projects.settings import Settings, current, executor, settings
 from potto.python.arguments import Batch, cut, flattened
-from potto.runtime.answers.batches import joined, unfinished
+from potto.runtime.answers.batches import joined, unfinished, with_what_was_made
 from potto.runtime.answers.estimate import Estimate
 from potto.runtime.evaluation.record import advancing
 
@@ -124,13 +124,15 @@ _sizes: dict[Any, tuple[int, bool]] = {}
 
 class _Tiles(Struct):
     """One batch. key: for whom the size of blocks is kept. done: the answers so far, by the first member of their
-    block. again: how many blocks were lost. spent: seconds that the last block took that was evaluated here."""
+    block. tried: those of blocks that only told the size. again: how many blocks were lost. spent: seconds that the
+    last block took that was evaluated here."""
 
     count: int
     here: Callable[[Part], Estimate]
     task: Callable[[list[Part]], Task]
     key: Any
     done: dict[int, Estimate] = field(default_factory=dict)
+    tried: list[Estimate] = field(default_factory=list)
     blocks: list[Part] = field(default_factory=list)
     again: int = 0
     spent: float = 0.0
@@ -165,12 +167,13 @@ class _Tiles(Struct):
         while not most and 2 * size <= self.count and size < MOST:
             self._alone((0, size))
             if ENOUGH <= self.spent < COLD:
+                self._put_aside()
                 self._alone((0, size))
             most = self.spent >= ENOUGH
             if most:
                 break
             tried, size = size, min(size * (64 if self.spent < LITTLE else 2), MOST)
-            self.done.clear()
+            self._put_aside()
         if not most and self.spent:  # twice as many take less than twice ENOUGH, and so may all
             while size < self.count and size < MOST and self.spent * self.count <= 2 * ENOUGH * tried:
                 size *= 2
@@ -178,6 +181,10 @@ class _Tiles(Struct):
             _sizes.clear()
         _sizes[self.key] = size, most
         return size
+
+    def _put_aside(self) -> None:
+        self.tried += self.done.values()
+        self.done.clear()
 
     def _alone(self, block: Part) -> Estimate:
         start, worked = time.perf_counter(), time.process_time()
@@ -245,7 +252,7 @@ class _Tiles(Struct):
                 if done
                 else [unfinished(some, together[-1][1] - together[0][0])]
             )
-        found = joined(parts)
+        found = with_what_was_made(joined(parts), self.tried)
         stats = {**found.stats, "blocks": len(blocks)}
         if self.again:
             stats["blocks done again"] = self.again

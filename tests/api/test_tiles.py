@@ -183,6 +183,14 @@ def test_a_large_batch_is_not_held_to_the_blocks_of_a_small_one(module: Any, mon
     assert [module.pair(np.linspace(0, 1, count)).stats["blocks"] for count in (2100, 9000, 2100)] == [1, 1, 1]
 
 
+def test_what_is_made_while_the_size_of_blocks_is_tried_is_told() -> None:
+    module = potto.compile("def fresh(x) integral [0, 1] u*[u < x]*0.123456789 d(u)")
+    first, second = (module.fresh(X) for _ in range(2))
+    made = ("definitions linked", "kernels compiled", "kernels from disk")
+    assert sum(first.stats[name] for name in made) > 0 == sum(second.stats[name] for name in made)
+    assert first.compile_seconds > second.compile_seconds  # a hundred times: links and kernels against a look-up
+
+
 def test_an_interrupt_keeps_what_is_done(module: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     whole, alone = module.plain(X, T), tiles._Tiles._alone
 

@@ -1,6 +1,6 @@
 """Answers of parts of a batch, put together.
 
-Owns `joined` and `unfinished`.
+Owns `joined`, `with_what_was_made` and `unfinished`.
 """
 
 from __future__ import annotations
@@ -37,6 +37,24 @@ def joined(parts: Sequence[Estimate]) -> Estimate:
         notes=_notes(parts, sizes), stats=stats_of(parts), shortfalls=missed,
         member_converged=converged_members(missed, (sum(sizes),)),
     )  # fmt: skip
+
+
+# Of what is counted, that which is made once, and which others find made.
+MADE = (
+    "definitions linked", "kernels compiled", "kernels from disk", "machine code compiled",
+    "machine code from the cache",
+)  # fmt: skip
+
+
+def with_what_was_made(found: Estimate, before: Sequence[Estimate]) -> Estimate:
+    """An estimate that tells as well what was made for others just before it, whose answers nobody sees."""
+    stats = stats_of(before)
+    return replace(
+        found,
+        compile_seconds=found.compile_seconds + sum(part.compile_seconds for part in before),
+        plan_seconds=found.plan_seconds + sum(part.plan_seconds for part in before),
+        stats=found.stats | {name: found.stats.get(name, 0) + stats[name] for name in MADE if name in stats},
+    )
 
 
 def unfinished(like: Estimate, count: int) -> Estimate:
