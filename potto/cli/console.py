@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 import os
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, Literal, TextIO
 
 from msgspec import Struct
@@ -55,6 +56,25 @@ class Console(Struct):
         if self.err.isatty():
             self.err.write(f"\r\x1b[K{text}")
             self.err.flush()
+
+    @contextmanager
+    def waiting(self) -> Iterator[None]:
+        """In this block a line says how far an evaluation is, for a person who waits; it goes away when it is over."""
+        if not self.err.isatty():
+            yield
+            return
+        from potto.evaluating.progress import Progress
+        from potto.runtime.evaluation.record import Gauge, watching
+
+        def columns() -> int:
+            try:
+                return os.get_terminal_size(self.err.fileno()).columns or 80
+            except (OSError, ValueError):
+                return 80
+
+        with Progress(self.err, columns, wants_color(self.color, self.err)) as progress, watching(Gauge()) as gauge:
+            progress.gauge = gauge
+            yield
 
     def palette(self, stream: TextIO) -> Palette:
         from potto.reports.render import COLORS, PLAIN

@@ -46,7 +46,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     text = options.expression.strip()
     try:
         file = opened(world, options.file, options.set, after=options.expression)
-        with accounts(options):
+        with accounts(options), console.waiting():
             answer = world.evaluate(file, text, settings)
     except ProgramError as error:
         return fail(error, options, console)

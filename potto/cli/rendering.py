@@ -250,11 +250,11 @@ class _Progress:
         self.frame, self.start = 0, time.perf_counter()
 
     def __call__(self, done: int) -> None:
-        from potto.runtime.answers.printing import format_seconds
+        from potto.evaluating.progress import duration
 
         total, done = self.pixels * self.frames, done + self.pixels * self.frame
         left = (time.perf_counter() - self.start) * (total - done) / max(done, 1)
-        rest = f", {format_seconds(left)} left" if 0 < done < total and left >= 1 else ""
+        rest = f", {duration(left)} left" if 0 < done < total and left >= 1 else ""
         of = f"frame {self.frame + 1} of {self.frames}, " if self.frames > 1 else ""
         self.console.progress(f"{of}{100 * done // total} % of {total:,} pixels{rest}")
 

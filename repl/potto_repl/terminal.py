@@ -27,7 +27,8 @@ from prompt_toolkit.history import FileHistory, History, InMemoryHistory
 from prompt_toolkit.output import ColorDepth
 from prompt_toolkit.styles import DynamicStyle
 
-from potto_repl.beside import PLAIN, Checker, Progress
+from potto.evaluating.progress import PLAIN, Progress
+from potto_repl.beside import Checker
 from potto_repl.highlight import PottoCompleter, PottoLexer, style
 from potto_repl.keyboard import kept_interrupts, loud_keys, quiet_keys
 from potto_repl.keys import bindings

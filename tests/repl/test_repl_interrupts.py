@@ -8,10 +8,10 @@ import threading
 import time
 
 import pytest
-from potto_repl.beside import Progress
 from potto_repl.respond import respond
 from screens import Screen
 
+from potto.evaluating.progress import Progress
 from potto.runtime.evaluation.record import Gauge
 
 AT_ONCE = 0.2  # seconds; what an interrupt may take

@@ -163,7 +163,7 @@ def test_what_is_wrong_is_underlined_while_one_types(loader):
 def test_progress_comes_late_and_goes_away():
     import io
 
-    from potto_repl.beside import Progress
+    from potto.evaluating.progress import Progress
 
     screen = io.StringIO()
     with Progress(screen):
