@@ -5,6 +5,8 @@ Each program was once one of which the formula missed a part.
 
 from __future__ import annotations
 
+import math
+
 import pytest
 
 import potto
@@ -100,3 +102,19 @@ def test_a_surface_for_each_value_of_an_index(bounds: str, body: str, names: str
     r = potto.hessian(potto.compile(f"def f(t) integral {bounds} ({body}) d({names})").f)(0.4)
     assert abs(r.value - exact) <= r.error + 1e-14
     assert r.error < 1e-10
+
+
+# A condition whose edge is a bound that moves, wherever that is, and the second derivative at t = 0.6.
+ON_BOUNDS = [
+    ("[0, t]", "exp(x)*[x <= t]", math.exp(0.6)),
+    ("[t, t + 2]", "exp(x)*[x >= t]", math.exp(2.6) - math.exp(0.6)),
+    ("[t, 2]", "[x >= t]*max(x - 1/2, t)", -1.0),
+    ("[0, t]", "(fold s = x for i in 1..2 (if [s < t] then s - 1 else s + s^2))", 1.0),
+]
+
+
+@pytest.mark.parametrize(("bounds", "body", "exact"), ON_BOUNDS, ids=[row[1] for row in ON_BOUNDS])
+def test_an_edge_that_is_a_bound(bounds: str, body: str, exact: float) -> None:
+    r = potto.hessian(potto.compile(f"def f(t) integral {bounds} {body} d(x)").f)(0.6)
+    assert abs(r.value - exact) <= r.error + 1e-15
+    assert r.error < 1e-12

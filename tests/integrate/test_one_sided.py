@@ -35,6 +35,13 @@ FOLDS = [  # what is integrated, where, backward, forward
     ("integral [0, 3] [sin(x) > t] d(x)", 1.0, -INF, 0.0),  # pi - 2 asin(t)
     ("integral ([-1, 1], [-1, 1]) [x^2 + y^2 < t] d(x, y)", 0.0, 0.0, math.pi),  # pi t
     ("integral ([-1, 1], [-1, 1]) [x^2 + y^2 > t]*exp(x) d(x, y)", 0.0, 0.0, -math.pi),
+    (
+        "integral ([-1, 1], [-1, 1]) [(x - 1/4)^2 + y^2 > t - 1/2] d(x, y)",
+        0.5,
+        0.0,
+        -math.pi,
+    ),
+    ("integral ([-1, 1], [-1, 1]) [2*(x - 1/4)^2 + (y - 0.7)^2 > t - 1/2]*t d(x, y)", 0.5, 4.0, 4 - math.pi / 8**0.5),
     ("integral ([-1e-150, 1e-150], [-1, 1]) [1e300*x^2 + y^2 < t] d(x, y)", 0.0, 0.0, math.pi * 1e-150),
     ("integral ([0, 1], [-1, 1], [-1, 1]) [x^2 + z^2 < t]*y d(y, x, z)", 0.0, 0.0, math.pi / 2),
     ("integral ([0, 1], [-1, 1]) [x^2 < t]*y d(y, x)", 0.0, 0.0, INF),
@@ -215,3 +222,15 @@ def test_an_integrand_without_a_value_at_the_bound_has_its_limit(
 def test_where_no_limit_shows_the_derivative_is_not_known(body: str) -> None:
     answer = rate(f"integral [0, 1/2] [x < t]*{body} d(x)")
     assert answer.tangent_error == INF and not answer.converged
+
+
+@pytest.mark.parametrize("backend", ["numpy", "native"])
+def test_members_at_which_an_ellipse_appears_are_looked_at_by_themselves(backend: str) -> None:
+    """Among members that are settled at once, as the surface does not cross the square beside it."""
+    f = potto.compile("def f(t) integral ([-1, 1], [-1, 1]) [(x - 1/4)^2 + y^2 > t - 1/2] d(x, y)").f
+    t = np.where(np.arange(600) % 100 == 7, 0.5, np.linspace(0.4, 0.499, 600))
+    with potto.settings(backend=backend):
+        r = potto.deriv(f)((t, 1.0))
+    (note,) = r.notes
+    assert np.flatnonzero(np.isfinite(note.forward)).tolist() == [*range(7, 600, 100)]
+    assert np.abs(note.forward[7::100] + math.pi).max() < 1e-8

@@ -296,7 +296,7 @@ def above(surface: Term, value: Term) -> Term:
     bounds = range_of(surface)
     if bounds.positive:
         return value
-    if bounds.hi <= 0:
+    if bounds.hi <= 0 or is_zero(surface):
         return zero_like(value)
     return branch((surface,), True, value, zero_like(value))
 

@@ -163,6 +163,7 @@ def _rows(values: tuple[Cell, ...], count: int) -> tuple[Array, Array]:
     places, off = np.empty((2, len(values), count))
     for row, cell in enumerate(values):
         places[row], off[row] = cell.v, 0.0 if cell.e is None else cell.e
+    off[np.isnan(off) & ~np.isnan(places)] = np.inf  # roots that merge just here: they are there, and nothing is known
     return places, off
 
 

@@ -90,8 +90,12 @@ class TopologyText(FormulaText):
         at.end()
 
     def near(self, cell: Symbol) -> str:
-        """From where on a place is as good as another."""
-        return self.zero if cell.e is None else self.at.apply("mul", self.at.number(CLEAR), cell.e)
+        """From where on a place is as good as another: where roots merge just here that is not known."""
+        if cell.e is None:
+            return self.zero
+        at = self.at
+        known = at.apply("select", at.apply("eq", cell.e, cell.e), cell.e, at.number(np.inf))
+        return at.apply("mul", at.number(CLEAR), known)
 
     def ordered(self, places: Sequence[str], near: Sequence[str]) -> Ordered:
         """Each row's rank is how many come before it: there are at most a dozen, so that comparing each with each takes
