@@ -177,6 +177,8 @@ def _held(bound: Cell) -> Cell:
 def label_of(lo: Cell, hi: Cell, x: Number) -> Array:
     """The label of a point between the bounds: the inverse of `stretch`."""
     low, high = lo.v, hi.v
+    if _unit(low, high):
+        return np.asarray(x)
     a, b = np.minimum(low, high), np.maximum(low, high)
     with np.errstate(invalid="ignore", divide="ignore"):
         finite = np.divide(x - low, high - low)
@@ -194,7 +196,7 @@ def stretch(lo: Cell, hi: Cell, u: Array, k: int) -> tuple[Cell, Cell]:
     rate = tuple(_minus(hi.t, lo.t, d) for d in range(k))
     if np.isfinite(low).all() and np.isfinite(high).all():
         t = tuple(_mix(lo.t, hi.t, d, u) for d in range(k))
-        return Cell(low + (high - low) * u, None, t), Cell(high - low, None, rate)
+        return Cell(u if _unit(low, high) else low + (high - low) * u, None, t), Cell(high - low, None, rate)
     sign = np.where(high < low, -1.0, 1.0)
     a, b = np.minimum(low, high), np.maximum(low, high)
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
@@ -209,6 +211,11 @@ def stretch(lo: Cell, hi: Cell, u: Array, k: int) -> tuple[Cell, Cell]:
     finite = ~(up | down)
     rate = tuple(None if r is None else np.where(finite, r, 0.0) for r in rate)
     return Cell(x, None, t), Cell(sign * slope, None, rate)
+
+
+def _unit(low: Number, high: Number) -> bool:
+    """Whether a variable is its label."""
+    return isinstance(low, float) and isinstance(high, float) and low == 0.0 and high == 1.0
 
 
 def _minus(a: tuple[Any, ...], b: tuple[Any, ...], d: int) -> Number | None:

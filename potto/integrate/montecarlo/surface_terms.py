@@ -235,7 +235,9 @@ class Surface(Struct, dict=True):
         with np.errstate(invalid="ignore", over="ignore"):  # where it counts for nothing
             jump, error = (above.v - below.v)[:, None, :], (above.e + below.e)[:, None, :]
             t, et = jump * rates, error * np.abs(rates)
-            et += ROUNDING * np.abs(t)
+            off = np.abs(t)
+            off *= ROUNDING
+            et += off
         if not counts.all():
             t, et = np.where(counts, t, 0.0), np.where(counts, et, 0.0)
         if unknown.any():
