@@ -104,22 +104,8 @@ class Iteration(Struct):
         if keep is not None:
             here, sides = seg.pick(keep), {g: take(m, keep) for g, m in sides.items()}
         moving = cuts.moving and machine.directions > 0
-        work = PanelBatch(
-            self,
-            number,
-            level,
-            env,
-            here,
-            sides,
-            machine,
-            moving,
-            batch,
-            root,
-            slack,
-            cuts.conflict,
-            cuts.paired,
-            cuts.rested,
-        )
+        work = PanelBatch(self, number, level, env, here, sides, machine, moving, batch, root, slack,
+                          cuts.conflict, cuts.paired, cuts.rested)  # fmt: skip
         sums = integrated(work)
         if not number and (lost_far_out := sums.undefined(batch)).size:
             self.nearer(work, sums, lost_far_out)

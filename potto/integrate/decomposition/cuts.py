@@ -40,6 +40,8 @@ ONE_PLACE = 1e-6
 NARROW = 16 * EPS
 # How far beside cuts that are taken for one a place is clear of all of them, in terms of how far off they may be.
 BLUR = 8
+# How many roundings apart an end and a turning place are one.
+ITSELF = 4
 
 
 class Cuts(Struct):
@@ -310,8 +312,10 @@ def _pieces(
     left, right = np.full(a.shape, -np.inf), np.full(a.shape, np.inf)
     for root, _ in beyond:
         at = root[owner]
-        left = np.where((at <= a) & (at > left), at, left)
-        right = np.where((at >= b) & (at < right), at, right)
+        # a map around a point that is but a rounding beyond an end leaves out the square root of that
+        low, high = (np.where(np.abs(at - end) <= ITSELF * EPS * np.abs(at), end, at) for end in (a, b))
+        left = np.where((low <= a) & (low > left), low, left)
+        right = np.where((high >= b) & (high < right), high, right)
     moving = bool(ta.any() or tb.any())
     bad, ea, eb = np.isnan(x[0]) | np.isnan(x[-1]), e[place, owner], e[place + 1, owner]
     near = np.stack((blur[place, owner], blur[place + 1, owner]))

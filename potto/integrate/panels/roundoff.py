@@ -18,8 +18,6 @@ from potto.kernels.cells import Array, Ints
 NODE_ROUNDING = 0.5
 # From how many lengths of a piece away from 0 on the rounding of its nodes is put right.
 FAR = 8
-# Up to how many times their rounding apart an end and a turning place are one.
-ITSELF = 4.0
 # Up to which part of its size two interpolants of one integrand differ at their common end by their rounding; from
 # which on that is a jump, which is looked for where cuts move in different ways (`degenerate.degeneracies`).
 SMOOTH, STEP = 1e-13, 1e-6
@@ -75,7 +73,7 @@ def misplaced(p: Pieces, seg: Segments, at_ends: Array) -> tuple[Ints, Array]:
     rounded = np.where(np.isfinite(turn), EPS * np.abs(turn), 0.0)
     off = np.stack((part.ea, part.eb), axis=1) + rounded
     with np.errstate(invalid="ignore"):  # of an end that is the turning place itself the map takes care
-        counts = (slope > 0) & np.isfinite(slope) & ~(np.abs(end - turn) <= ITSELF * rounded)
+        counts = (slope > 0) & np.isfinite(slope) & (end != turn)
     share = np.divide(off, slope, out=np.zeros_like(off), where=counts)
     lost = np.abs(at_ends[:, :, index]) * np.minimum(share, 1.0)
     return index, np.where(np.isfinite(lost), lost, 0.0).sum(axis=-1)
