@@ -19,7 +19,7 @@ from tables import Chapter, Curve, Driver, Entry, Picture
 import potto
 from potto.__main__ import main as command
 
-POINTS, QUICK_POINTS = 241, 9
+POINTS, QUICK_POINTS = 241, 5
 GOOD = 1e-8  # how far off a number of a curve may be, as a part of its size or of 1, that nothing is said of it
 
 

@@ -18,7 +18,7 @@ function = "pixel"
 given = { shader = "depth", q = "0.2" }
 wrt = ["q"]                            # derivatives by these, each a picture
 size = [256, 256]
-quick = [16, 16]                       # the size of a quick pass
+quick = [8, 8]                         # the size of a quick pass
 box = [-1, 1, -1, 1]
 pixel = "h"                            # the name of the program that is the width of a pixel
 options = ["--tone", "srgb"]           # more of the options of `potto render`
@@ -57,7 +57,7 @@ class Picture:
     program: str
     function: str
     size: tuple[int, int] = (256, 256)
-    quick: tuple[int, int] = (16, 16)
+    quick: tuple[int, int] = (8, 8)
     box: tuple[float, float, float, float] = (0.0, 1.0, 0.0, 1.0)
     given: tuple[tuple[str, str], ...] = ()
     pixel: str = ""
