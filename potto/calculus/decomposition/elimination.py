@@ -109,7 +109,7 @@ def _split(term: Term, here: Names, inner: Names) -> tuple[Term, Term]:
     """A term as a product of what the inner variables don't occur in, and the rest."""
     weight: list[Term] = []
     rest: list[Term] = []
-    for factor in _factors(term):
+    for factor in factors(term):
         if not factor.free & inner:
             weight.append(factor)
             continue
@@ -124,7 +124,7 @@ def _split(term: Term, here: Names, inner: Names) -> tuple[Term, Term]:
     return mul(*weight) if weight else ONE, mul(*rest) if rest else ONE
 
 
-def _factors(term: Term) -> Iterable[Term]:
+def factors(term: Term) -> Iterable[Term]:
     waiting = [term]
     while waiting:
         item = waiting.pop()
@@ -136,7 +136,7 @@ def _factors(term: Term) -> Iterable[Term]:
                 yield neg(ONE)
             case Prim(op="div", args=(above, below)) if above is not ONE:
                 waiting.append(above)
-                yield from (div(ONE, factor) for factor in _factors(below))
+                yield from (div(ONE, factor) for factor in factors(below))
             case Branch(then=then, orelse=orelse) if orelse is ZERO and then is not ONE:
                 waiting += (then, branch(item.coordinates, item.strict, ONE, ZERO))
             case Branch(then=then, orelse=orelse) if then is ZERO and orelse is not ONE:
@@ -215,7 +215,7 @@ class _Handed(Struct):
     def _rebuilt(self, node: Term, memo: dict[Term, Term]) -> Term:
         if isinstance(node, Prim) and node.op in ("add", "mul"):
             together = add if node.op == "add" else mul
-            parts = _summands(node, self.here | self.inner) if node.op == "add" else list(_factors(node))
+            parts = _summands(node, self.here | self.inner) if node.op == "add" else list(factors(node))
             known = [p for p in parts if not p.free & self.inner and p.free & self.here]
             others = [self._again(p, memo) for p in parts if p.free & self.inner or not p.free & self.here]
             return together(*others, self._single(together(*known))) if known else together(*others)

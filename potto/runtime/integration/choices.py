@@ -21,9 +21,6 @@ PER_LEVEL, AFFORDABLE = 12, 1_000_000
 LOOSE = 1e-3
 MET = 4  # one in so many planes that may cut a variable does: half of what it takes to twice that, of polytopes
 FEW_NODES = 30_000  # up to which iterated quadrature is no slower
-# The same where no variable hands on a number, so that one after the other makes no tables: six conditions, each on a
-# variable of its own (720 nodes), take 30 ms by iterated quadrature and 9 ms so, to as many digits.
-FEW_OF_PRODUCT = 500
 # Evaluations that are spent on one order of two variables before another one is tried; how many times those of one
 # variable more.
 TRIAL, TRIAL_FACTOR = 50_000, 6
@@ -44,11 +41,7 @@ def many(problem: Problem) -> bool:
     """Whether it pays to look whether the variables can be eliminated."""
     if len(problem.term.variables) <= MOST_LEVELS or problem.machine.frozen or placed_along(problem.term) is not None:
         return False
-    nodes = expected(problem)
-    if FEW_OF_PRODUCT < nodes <= FEW_NODES:
-        known = problem.steps()
-        return known is not None and not any(step.state for step in known.steps)
-    return nodes > FEW_NODES
+    return expected(problem) > FEW_NODES
 
 
 def expected(problem: Problem) -> int:

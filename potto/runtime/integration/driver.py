@@ -13,8 +13,9 @@ from typing import Any
 import numpy as np
 from msgspec.structs import replace
 
+from potto.calculus.decomposition.independent import in_factors
 from potto.calculus.surfaces.discontinuities import TooDeep
-from potto.core.terms import Integral, function_of
+from potto.core.terms import Integral
 from potto.diagnostics import PottoError
 from potto.integrate.events import BUDGET_SPENT
 from potto.integrate.pieces import INTO, OF, Sums, gather, still
@@ -32,7 +33,8 @@ from potto.runtime.integration.preparation import filled, held, placed, prepared
 from potto.runtime.integration.problem import Mixed, Problem, linked
 from potto.runtime.integration.rims import note_rims
 from potto.runtime.integration.solving import solve
-from potto.runtime.integration.taken_apart import summed
+from potto.runtime.integration.summands import SAMPLED
+from potto.runtime.integration.taken_apart import together
 
 
 def integral(machine: Machine, term: Integral, env: dict[str, Value]) -> Value:
@@ -46,7 +48,7 @@ def integral(machine: Machine, term: Integral, env: dict[str, Value]) -> Value:
         except Differ as differ:
             return _by_length(machine, term, env, differ.ends)
         if not isinstance(ready, Integral):
-            return summed(machine, ready, env)
+            return together(machine, ready, env)
         term = ready
     different = next((each for name in term.free for each in choices(env[name])), None)
     if different is not None:
@@ -66,10 +68,12 @@ def _of_numbers(machine: Machine, term: Integral, env: dict[str, Value]) -> Valu
         env = {**env, **{new: pad(still(env[old]), machine.directions) for old, new in stopped}}
     with making:
         ready = prepared(term, linker.reach)
+        if ready is term and machine.settings.method not in SAMPLED:
+            ready = in_factors(term)
     if ready is not term:
         if derived and not machine.directions:
             note_rims(machine, term, env)
-        return machine.evaluate(function_of(ready), {n: env[n] for n in ready.free}, None)
+        return together(machine, ready, env)
     return integrate(machine, term, env)
 
 

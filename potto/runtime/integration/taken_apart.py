@@ -1,6 +1,7 @@
-"""An integral that was taken apart into a sum of integrals: one-sided derivatives of parts are not those of the whole.
+"""An integral that was taken apart into sums and products of integrals, with the one-sided derivatives of the whole.
 
-Owns `summed`. A surface on the bound of one part lies inside of the whole where another part begins there.
+Owns `together`. A surface on the bound of one part lies inside of the whole where another part begins there, and what
+the other factors of a product come to counts as well.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from potto.runtime.evaluation.machine import Machine
 from potto.runtime.evaluation.sides import as_a_whole
 
 
-def summed(machine: Machine, term: Term, env: dict[str, Value]) -> Value:
-    """The value of the sum that an integral is equal to, with the derivatives of the whole."""
+def together(machine: Machine, term: Term, env: dict[str, Value]) -> Value:
+    """The value of what an integral is equal to, with the derivatives of the whole."""
     function, given = function_of(term), tuple(env[name] for name in sorted(term.free))
     return as_a_whole(machine, term, given, lambda own, values: own.run(function, list(values), None))  # type: ignore[arg-type]
