@@ -115,7 +115,7 @@ def _split(term: Term, here: Names, inner: Names) -> tuple[Term, Term]:
             continue
         match factor:
             case Prim(op="exp", args=(inside,)):
-                terms = _summands(inside, here | inner)
+                terms = summands(inside, here | inner)
                 known = [t for t in terms if not t.free & inner]
                 if known:
                     weight.append(prim("exp", add(*known)))
@@ -162,7 +162,7 @@ def _every(surface: Term) -> list[Term]:
     return [surface]
 
 
-def _summands(term: Term, names: Names) -> list[Term]:
+def summands(term: Term, names: Names) -> list[Term]:
     """What a term is a sum of, that what has none of some variables is multiplied into."""
     found: list[Term] = []
     waiting: list[tuple[Term, tuple[Scaled, ...]]] = [(term, ())]
@@ -215,7 +215,7 @@ class _Handed(Struct):
     def _rebuilt(self, node: Term, memo: dict[Term, Term]) -> Term:
         if isinstance(node, Prim) and node.op in ("add", "mul"):
             together = add if node.op == "add" else mul
-            parts = _summands(node, self.here | self.inner) if node.op == "add" else list(factors(node))
+            parts = summands(node, self.here | self.inner) if node.op == "add" else list(factors(node))
             known = [p for p in parts if not p.free & self.inner and p.free & self.here]
             others = [self._again(p, memo) for p in parts if p.free & self.inner or not p.free & self.here]
             return together(*others, self._single(together(*known))) if known else together(*others)
@@ -236,7 +236,7 @@ class _Handed(Struct):
         varying: dict[Term, Fraction] = {}
         constant: list[Term] = []
         moving: list[Term] = []
-        for summand in _summands(term, self.here):
+        for summand in summands(term, self.here):
             coefficient, atom = split(summand)
             if atom.free & self.here:
                 varying[atom] = varying.get(atom, Fraction(0)) + coefficient

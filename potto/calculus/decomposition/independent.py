@@ -8,8 +8,8 @@ from __future__ import annotations
 import math
 from functools import lru_cache
 
-from potto.calculus.decomposition.elimination import factors
-from potto.core.terms import ONE, Const, Delta, Integral, Term, integral, mul, postorder
+from potto.calculus.decomposition.elimination import factors, summands
+from potto.core.terms import ONE, Const, Delta, Integral, Prim, Term, add, integral, mul, postorder, prim
 
 Names = frozenset[str]
 # About how many nodes a variable takes, with ends and without; up to which product of them one rule for all variables,
@@ -25,35 +25,54 @@ def in_factors(term: Integral) -> Term:
     nodes = math.prod(ENDLESS if any(map(_is_infinite, pair)) else WITH_ENDS for pair in term.bounds)
     if len(names) < 2 or nodes <= FEW or any(isinstance(node, Delta) for node in postorder(term.body)):
         return term
-    found = list(factors(term.body))
-    connections = [factor.free & names for factor in found]
+    found = [_summed(factor, names) for factor in factors(term.body)]
+    connections = [piece.free & names for factor in found for piece in factor]
     for variable, pair, hints in zip(term.variables, term.bounds, term.hints, strict=True):
         connections.append(frozenset((variable,)).union(*(place.free & names for place in (*pair, *hints))))
     groups: list[Names] = []
     for connected in filter(None, connections):
         met = [group for group in groups if group & connected]
         groups = [group for group in groups if not group & connected] + [connected.union(*met)]
-    if len(groups) < 2 or any(not _stands(term, group, found) for group in groups):
+    if len(groups) < 2:
         return term
-    outside = [factor for factor in found if not factor.free & names]
-    return mul(*outside, *(_part(term, group, found) for group in groups))
+    bodies = [mul(*(_of_group(factor, group, groups) for factor in found)) for group in (*groups, frozenset())]
+    if any(body is ONE and not _ends(term, group) for body, group in zip(bodies, groups, strict=False)):
+        return term
+    return mul(bodies[-1], *(_part(term, group, body) for group, body in zip(groups, bodies, strict=False)))
 
 
-def _stands(term: Integral, group: Names, found: list[Term]) -> bool:
-    """Whether there is something to integrate over some variables, or the ends of their ranges are no infinite ones."""
-    if any(factor.free & group for factor in found):
-        return True
-    bounds = [bound for v, pair in zip(term.variables, term.bounds, strict=True) if v in group for bound in pair]
+def _summed(factor: Term, names: Names) -> tuple[Term, ...]:
+    """A factor; of an exponential of a sum what is added up."""
+    if isinstance(factor, Prim) and factor.op == "exp":
+        return tuple(prim("exp", part) for part in summands(factor.args[0], names))
+    return (factor,)
+
+
+def _of_group(factor: tuple[Term, ...], group: Names, groups: list[Names]) -> Term:
+    """What of a factor varies with a group of variables; what varies with none is left outside, or, of an exponential,
+    to the first group that it varies with, which it may keep from an overflow."""
+    own = [piece for piece in factor if piece.free & group]
+    still = [piece for piece in factor if not any(piece.free & each for each in groups)]
+    first = next((each for each in groups if any(piece.free & each for piece in factor)), frozenset())
+    pieces = [*own, *still] if group == first else own
+    if len(pieces) < 2:
+        return pieces[0] if pieces else ONE
+    return prim("exp", add(*(piece.args[0] for piece in pieces if isinstance(piece, Prim))))
+
+
+def _ends(term: Integral, group: Names) -> bool:
+    """Whether the ranges of a group of variables are bounded."""
+    bounds = (bound for v, pair in zip(term.variables, term.bounds, strict=True) if v in group for bound in pair)
     return not any(map(_is_infinite, bounds))
 
 
-def _part(term: Integral, group: Names, found: list[Term]) -> Integral:
+def _part(term: Integral, group: Names, body: Term) -> Integral:
     """The integral of the factors of a group of variables over these."""
     own = [i for i, variable in enumerate(term.variables) if variable in group]
     variables, bounds, hints = (
         tuple(term.variables[i] for i in own), tuple(term.bounds[i] for i in own), tuple(term.hints[i] for i in own)
     )  # fmt: skip
-    return integral(variables, bounds, mul(ONE, *(factor for factor in found if factor.free & group)), hints)
+    return integral(variables, bounds, body, hints)
 
 
 def _is_infinite(bound: Term) -> bool:
