@@ -70,6 +70,8 @@ def _of_numbers(machine: Machine, term: Integral, env: dict[str, Value]) -> Valu
         ready = prepared(term, linker.reach)
         if ready is term and machine.settings.method not in SAMPLED:
             ready = in_factors(term)
+            if ready is not term:  # sums of products are not products of sums
+                machine = machine.changed(into=None, of=None)
     if ready is not term:
         if derived and not machine.directions:
             note_rims(machine, term, env)
