@@ -199,3 +199,14 @@ def test_the_second_derivative_where_roots_go_on_without_end() -> None:
     f = potto.compile("def f(t) integral [-inf, inf] exp(-x^2/2)*[cos(x*t) < 0.3] d(x)").f
     r = potto.hessian(f)(t)
     assert abs(r.value - exact) <= r.error + 1e-14 and r.error < 1e-10
+
+
+# What these are given is beyond what they come to, so that the formula of a root has no value.
+NOWHERE = ["tanh(x)", "erf(x)", "erf(exp(-x^2/2))", "-sqrt(1 + (x + 1/2)^2)", "-exp(x)", "2*sin(x)/3", "1/(1 + x^2)"]
+
+
+@pytest.mark.parametrize("body", NOWHERE)
+def test_a_delta_that_is_nowhere_is_nothing(body: str) -> None:
+    m = potto.compile(f"def f(t) integral [0, 1] exp(x)*delta(t - {body}) d(x)")
+    r = potto.deriv(m.f)((1.25, 1.0))
+    assert (r.value, r.error, r.tangent, r.tangent_error, r.converged) == (0.0, 0.0, 0.0, 0.0, True)

@@ -14,8 +14,8 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from msgspec import Struct
 
 from potto.calculus.algebra.radicals import NAN
-from potto.calculus.algebra.ranges import range_of
 from potto.calculus.algebra.rational_form import is_zero
+from potto.calculus.differentiation.between import between, scaled
 from potto.calculus.differentiation.derivative import partial, total, vanishes, zero_like
 from potto.calculus.solving.pivots import NoClosedForm as NoClosedForm
 from potto.calculus.solving.pivots import Root, chosen, conjunction, pivots
@@ -40,7 +40,6 @@ from potto.core.terms import (
     ZERO,
     Branch,
     Const,
-    If,
     Integral,
     Prim,
     Sum,
@@ -266,47 +265,6 @@ def at_bounds(node: Integral, rate: Rate) -> list[Term]:
 # Building
 
 
-def between(at: Term, lo: Term, hi: Term, value: Term) -> Term:
-    """`value` where lo < at < hi, minus it where hi < at < lo, 0 elsewhere and where `at` is not a number."""
-    upward = value
-    if finite(hi):
-        upward = above(sub(hi, at), upward)
-    if finite(lo):
-        upward = above(sub(at, lo), upward)
-    if not (finite(lo) and finite(hi)) or range_of(sub(hi, lo)).lo >= 0:
-        return exists(at, upward)
-    downward = above(sub(lo, at), above(sub(at, hi), scaled(value, neg(ONE))))
-    return exists(at, branch((sub(hi, lo),), False, upward, downward))
-
-
-def exists(at: Term, value: Term) -> Term:
-    """`value` where `at` is a number, else 0: these conditions come first, and of roots of roots the inner ones, as a
-    comparison with nan is nan.
-    """
-    for surface in _guards(at):
-        value = branch((surface,), False, value, zero_like(value))
-    for radicand in [n.args[0] for n in reversed(postorder(at)) if isinstance(n, Prim) and n.op in ("sqrt", "log")]:
-        if not range_of(radicand).positive:
-            value = branch((radicand,), False, value, zero_like(value))
-    return value
-
-
-def above(surface: Term, value: Term) -> Term:
-    """`value` where the surface is positive, else 0."""
-    bounds = range_of(surface)
-    if bounds.positive:
-        return value
-    if bounds.hi <= 0 or is_zero(surface):
-        return zero_like(value)
-    return branch((surface,), True, value, zero_like(value))
-
-
-def finite(bound: Term) -> bool:
-    """Whether a bound is not known to be infinite."""
-    bounds = range_of(bound)
-    return not (bounds.lo == bounds.hi and abs(bounds.lo) == float("inf"))
-
-
 def remaining(node: Integral, name: str, at: Term, body: Term) -> Term:
     """The integral over the other variables, with this one put at a place."""
     position = node.variables.index(name)
@@ -332,19 +290,6 @@ def difference(a: Term, b: Term) -> Term:
     if isinstance(zero, Tuple):
         return tuple_(difference(proj(a, i), proj(b, i)) for i in range(len(zero.items)))
     return ZERO if a is b else sub(a, b)
-
-
-def scaled(value: Term, factor: Term) -> Term:
-    """A number or a tuple of numbers times a factor; a side that is 0 stays 0 where the factor is not a number."""
-    match value:
-        case Tuple(items=items):
-            return tuple_(scaled(item, factor) for item in items)
-        case Branch():
-            return branch(value.coordinates, value.strict, scaled(value.then, factor), scaled(value.orelse, factor))
-        case If():
-            return if_(value.condition, scaled(value.then, factor), scaled(value.orelse, factor))
-        case _:
-            return mul(value, factor)
 
 
 # Without an integral

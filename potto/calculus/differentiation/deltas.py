@@ -11,7 +11,8 @@ from potto.calculus.algebra.radicals import quotient
 from potto.calculus.algebra.ranges import range_of
 from potto.calculus.algebra.rational_form import is_zero
 from potto.calculus.differentiation import level_sets
-from potto.calculus.differentiation.boundary_terms import between, remaining, scaled
+from potto.calculus.differentiation.between import between, scaled
+from potto.calculus.differentiation.boundary_terms import remaining
 from potto.calculus.differentiation.derivative import partial, total, vanishes, zero_like
 from potto.calculus.solving.pivots import NoClosedForm, Root, chosen, pivots
 from potto.calculus.surfaces.branch_assignment import branches_of, flipping, forced, unguarded

@@ -11,7 +11,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 from potto.calculus.differentiation import loops
-from potto.calculus.differentiation.boundary_terms import at_bounds, at_surfaces, jumps, scaled
+from potto.calculus.differentiation.between import scaled
+from potto.calculus.differentiation.boundary_terms import at_bounds, at_surfaces, jumps
 from potto.calculus.differentiation.deltas import without_deltas, without_leftovers
 from potto.calculus.differentiation.derivative import NotSmooth, partial, total, zero_like
 from potto.calculus.differentiation.level_sets import level_set, steep, transported

@@ -21,7 +21,8 @@ from functools import lru_cache
 from msgspec import Struct
 
 from potto.calculus.algebra.ranges import range_of
-from potto.calculus.differentiation.boundary_terms import Rate, finite, jumps, remaining, scaled
+from potto.calculus.differentiation.between import finite, scaled
+from potto.calculus.differentiation.boundary_terms import Rate, jumps, remaining
 from potto.calculus.differentiation.derivative import NotSmooth, partial, total, vanishes, zero_like
 from potto.calculus.solving.enclosable import searchable
 from potto.calculus.solving.pivots import NoClosedForm

@@ -10,7 +10,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from potto.calculus.differentiation.boundary_terms import scaled
+from potto.calculus.differentiation.between import scaled
 from potto.calculus.differentiation.derivative import total, zero_like
 from potto.calculus.differentiation.level_sets import coefficient, deltas_over
 from potto.core.simplify import normalized_surface
