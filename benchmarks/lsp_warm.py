@@ -1,13 +1,15 @@
 """What edits cost the analysis of the language server alone, in processor time of its thread: on a busy machine too.
 
-Run: `python benchmarks/lsp_warm.py`. The same workspace as in `lsp.py`, all of it checked, five files open; no client,
-no messages, no other threads. It takes about ten seconds to begin with.
+Run: `python benchmarks/lsp_warm.py [--arrays]`. The same workspace as in `lsp.py`, all of it checked, five files open;
+no client, no messages, no other threads. It takes about ten seconds to begin with.
 """
 
 from __future__ import annotations
 
 import gc
 import os
+import re
+import sys
 import tempfile
 import time
 from collections.abc import Callable
@@ -83,8 +85,15 @@ def show(what: str, edits: Callable[[int], Times]) -> None:
         )
 
 
+def renamed(leaf: str, name: str) -> str:
+    """The leaf with another name for the second parameter of what its importers use."""
+    first, *others = re.split(r"(?m)^(?=def )", leaf)
+    return first + "".join(re.sub(r"\bk\b", name, d) if d.startswith(("def f0(", "def f1(")) else d for d in others)
+
+
 def main() -> None:
-    texts = workspace()
+    arrays = "--arrays" in sys.argv
+    texts = workspace(arrays)
     large, leaf = texts["large"], texts["m0"]
     users = [name for name, text in texts.items() if "from m0 import f1 " in text or "import m0 as" in text][:3]
     at = large.index("sin(", len(large) // 2)
@@ -104,6 +113,8 @@ def main() -> None:
         show("a line at its top", lambda n: session.edit("large", moved[n % 2], {"large"}))
         heads = [changed, leaf]
         show("signature in a leaf, to its open importers", lambda n: session.edit("m0", heads[n % 2], set(users)))
+        unseen = [renamed(leaf, f"k{n}") if n % 2 else changed for n in range(ROUNDS)]
+        show("the same, mended in a new way each time", lambda n: session.edit("m0", unseen[n], set(users)))
         print(f"front end: {front_end()}; load {os.getloadavg()[0]:.1f} of {os.cpu_count()} processors")
 
 
