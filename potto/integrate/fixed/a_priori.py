@@ -1,11 +1,12 @@
 """One integral between known cuts, straight through: no pieces, no refinement, as many nodes as were proved enough.
 
-Owns `certain`, `proved_sum` and `Crowded`. Where all cuts are closed forms and on every cell between them the integrand
-is one analytic formula, `proved_orders` says beforehand how many nodes do. What is left is a short program: bounds and
-cuts as formulas of the variables further out, the nodes between them, the formula at the nodes, weighted sums. Its
-derivative is that of the program, whose nodes move with the parameters (Reynolds' transport theorem: a surface that
-moves takes its nodes along, so that no boundary term is left). Its rounding is kept track of as everywhere outside of
-integrals, by a running error analysis from the bounds to the sums. Whatever is not plain here is left to `levels`.
+Owns `certain`, `beside_bounds`, `proved_sum` and `Crowded`. Where all cuts are closed forms and on every cell between
+them the integrand is one analytic formula, `proved_orders` says beforehand how many nodes do. What is left is a short
+program: bounds and cuts as formulas of the variables further out, the nodes between them, the formula at the nodes,
+weighted sums. Its derivative is that of the program, whose nodes move with the parameters (Reynolds' transport theorem:
+a surface that moves takes its nodes along, so that no boundary term is left). Its rounding is kept track of as
+everywhere outside of integrals, by a running error analysis from the bounds to the sums. Whatever is not plain here is
+left to `levels`.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from msgspec import Struct
 from potto.core.terms import children
 from potto.integrate.fixed.alone import Face, machine_code, promotion, summed_alone, summed_by
 from potto.integrate.fixed.moving_sums import Totals, evaluated, summed
+from potto.integrate.fixed.on_bounds import OnBounds, Place, Tied
 from potto.integrate.fixed.regions import LOOSEST, Path, known, region_of, settle
 from potto.integrate.fixed.straight import CLEAR, Straight, nothing
 from potto.integrate.pieces import Evaluator, Sums
@@ -37,9 +39,6 @@ MOST_CELLS, MOST_NODES = 24, 60_000
 # How far off a rule may be for a sum that cancels, as a part of what it is when nothing does.
 NOISE = 1e-12
 
-Place = tuple[float, float, int]  # of a bound or cut: where it is, how far off that may be, its row in the frame
-
-
 # Where the cells are
 
 
@@ -53,13 +52,14 @@ class Crowded(_NotPlain):
 
 
 def _cells(
-    plan: Straight, machine: Evaluator, env: dict[str, Value], frame: tuple[Cell, ...]
+    plan: Straight, machine: Evaluator, env: dict[str, Value], frame: tuple[Cell, ...], ties: OnBounds | None = None
 ) -> tuple[tuple[Stretch, ...], float]:
     """The cells between the cuts, with the integrand on each; those on which it is 0 left out. And the least length.
 
-    frame: the bounds and cuts of the outermost variable.
+    frame: the bounds and cuts of the outermost variable. ties: what to do with cuts that lie on bounds.
     """
-    tracked = machine.with_directions(machine.directions if machine.costs is not None else 0).tracking()
+    moves = machine.costs is not None or ties is not None
+    tracked = machine.with_directions(machine.directions if moves else 0).tracking()
     cells: list[Stretch] = []
     here, shortest = dict(env), math.inf
 
@@ -74,9 +74,9 @@ def _cells(
                 cells.append(Stretch(path, face))
             return
         values = evaluated(plan.frames[i], tracked, here) if i else frame
-        for low, high, middle, length in _stretches(plan, i, tracked, values):
+        for low, high, middle, length in _stretches(plan, i, tracked, values, ties):
             here[plan.variables[i]] = Cell(middle)
-            shortest = min(shortest, length)
+            shortest = min(shortest, length or math.inf)
             over(i + 1, (*path, (low, high)))
 
     over(0, ())
@@ -84,9 +84,10 @@ def _cells(
 
 
 def _stretches(
-    plan: Straight, i: int, machine: Evaluator, values: tuple[Cell, ...]
+    plan: Straight, i: int, machine: Evaluator, values: tuple[Cell, ...], ties: OnBounds | None
 ) -> list[tuple[int, int, float, float]]:
-    """Between which rows of the frame one variable runs, the middles and the lengths."""
+    """Between which rows of the frame one variable runs, the middles and the lengths, which are 0 between a bound and
+    a cut that lies on it."""
     if machine.costs is not None:
         for surface, rows in plan.jumps[i]:
             roots = [(values[row].v, values[row].t) for row in rows]
@@ -104,6 +105,11 @@ def _stretches(
     if hi[0] - lo[0] <= lo[1] + hi[1]:
         raise _NotPlain
     kept.append(hi)
+    if ties is not None:
+        found = ties.stretches(plan, i, values, places, kept)
+        if found is None:
+            raise Crowded
+        return found
     if any(b[0] - a[0] <= a[1] + b[1] for a, b in itertools.pairwise(kept)):
         raise Crowded
     return [(a[2], b[2], 0.5 * (a[0] + b[0]), b[0] - a[0]) for a, b in itertools.pairwise(kept)]
@@ -144,8 +150,61 @@ def certain(plan: Straight, machine: Evaluator, env: dict[str, Value]) -> Sums |
         raise
     except _NotPlain:
         return None
-    if found is None:
+    return None if found is None else _sums(found)
+
+
+def beside_bounds(plan: Straight, machine: Evaluator, env: dict[str, Value]) -> Tied | None:
+    """The integral for one set of parameters at which cuts lie on bounds: as they are, and to either side. None where
+    something else about it is not plain.
+
+    What lies between such a cut and its bound has the length 0, whether it is counted or not; how far off the value
+    may be is the most that it is with it and without, since rounding hides which of them is right.
+    """
+    values = _numbers(plan, env)
+    if values is None or machine.frozen or machine.side or machine.costs is not None or machine.directions > 1:
         return None
+    frame = evaluated(plan.frames[0], machine.tracking(), env)
+    ties, found = OnBounds(), dict[frozenset[Any], Totals | None]()
+
+    def total(inside: frozenset[Any]) -> Totals:
+        if inside not in found:
+            ties.inside = inside
+            found[inside] = _between(plan, machine, env, frame, values, ties)
+        if (one := found[inside]) is None:
+            raise _NotPlain
+        return one
+
+    try:
+        total(frozenset())  # meets them
+        whole, backward, forward = (total(ties.towards(side)) for side in (0, -1, 1))
+    except _NotPlain:
+        return None
+    error = [max(one.error[0] for one in found.values() if one is not None), *whole.error[1:]]
+    whole = Totals(whole.number, error, whole.gross)
+    return Tied(_sums(whole), _sums(backward), _sums(forward), ties.causes(plan))
+
+
+def _between(
+    plan: Straight, machine: Evaluator, env: dict[str, Value], frame: tuple[Cell, ...], values: dict[str, float],
+    ties: OnBounds,
+) -> Totals | None:  # fmt: skip
+    """The sum over the cells that there are where such cuts have come in as `ties` says."""
+    reach, rtol = float(frame[1].v - frame[0].v), min(machine.rtol, LOOSEST)
+    cells, shortest = _cells(plan, machine, env, frame, ties)
+    if not cells:
+        nothing = [0.0] * (1 + machine.directions)
+        return Totals(nothing, nothing, nothing)
+    proof = region_of(plan, cells, values, reach, shortest, rtol) if len(cells) <= MOST_CELLS else None
+    if proof is None or sum(proof[0].outer) * math.prod(proof[0].inner) > MOST_NODES:
+        return None
+    totals = summed(plan.variables, plan.frames, proof[0], machine, env, frame, ties.put)
+    if totals is None:
+        return None
+    machine.count(totals.nodes)
+    return _accurate(totals, _truncation(plan, proof[0], machine.directions, env), machine.rtol, machine.atol)
+
+
+def _sums(found: Totals) -> Sums:
     block = np.array((found.number, found.error))[:, None, :, None]
     added = np.array([[found.gross[0]], [max(found.gross[1:], default=0.0)]])
     return Sums(block[0, :, 0], block[1, :, 0], block[0, :, 1:], block[1, :, 1:], gross=added)

@@ -9,7 +9,7 @@ cell.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import lru_cache
 
 import numpy as np
@@ -21,6 +21,8 @@ from potto.integrate.rules.gauss import EPS, gauss
 from potto.integrate.rules.proved_orders import Region
 from potto.kernels.cells import Array, Cell, Ints, Value
 
+# A variable's number and its frame -> the frame.
+Put = Callable[[int, tuple[Cell, ...]], tuple[Cell, ...]]
 # The rounding of a sum of products, in units of the last place.
 SUMMED = 4 * EPS
 
@@ -85,11 +87,12 @@ class Totals(Struct, frozen=True):
 
 def summed(
     variables: Sequence[str], frames: Sequence[Lam], region: Region, machine: Evaluator, env: dict[str, Value],
-    frame: tuple[Cell, ...],
+    frame: tuple[Cell, ...], put: Put | None = None,
 ) -> Totals | None:  # fmt: skip
     """Weighted sums over the nodes of all cells: value and tangents, with their rounding. None where cuts cross.
 
     frames: per variable its bounds and cuts, as functions of what is further out; `frame` has the values of the first.
+    put: what puts the cuts of a variable that lie on its bounds there, so that stretches may have the length 0.
     """
     tracked, here, layout, k = machine.tracking(), dict(env), _layout(region), machine.directions
     shape: tuple[int, ...] = (1,)
@@ -97,9 +100,11 @@ def summed(
     for i, variable in enumerate(variables):
         if i:
             frame = evaluated(frames[i], tracked, here)
+        if put is not None:
+            frame = put(i, frame)
         block = _block(frame, k, shape) if i else _numbers(frame, k)
         ends = block.take(layout.ends[i], axis=2)
-        if i and _crossed(block[0, 0].reshape(len(frame), *shape), *ends[0, 0]):
+        if i and _crossed(block[0, 0].reshape(len(frame), *shape), ends[0, 0, 0], ends[0, 0, 1], put is not None):
             return None
         lo, width, off = _between(ends)
         for name in variables[:i]:
@@ -154,9 +159,9 @@ def _between(ends: Array) -> tuple[Array, Array, Array]:
     return lo, hi - lo, off[:, 0] + off[:, 1]
 
 
-def _crossed(places: Array, lo: Array, hi: Array) -> bool:
-    """Whether ends are not in order, or a cut lies between them, at any node."""
-    if not (lo < hi).all():
+def _crossed(places: Array, lo: Array, hi: Array, touching: bool) -> bool:
+    """Whether ends are not in order, or a cut lies between them, at any node. touching: ends may be the same."""
+    if not ((lo <= hi) if touching else (lo < hi)).all():
         return True
     return len(places) > 2 and bool(((places > lo) & (places < hi)).any())
 

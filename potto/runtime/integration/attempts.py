@@ -16,17 +16,21 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from potto.core.terms import Integral
-from potto.integrate.events import BUDGET_SPENT, Events, Shortfall
-from potto.integrate.fixed.a_priori import Crowded, certain
+from potto.integrate.events import BUDGET_SPENT, Events, OneSidedDerivatives, Shortfall
+from potto.integrate.fixed.a_priori import Crowded, beside_bounds, certain
+from potto.integrate.fixed.on_bounds import Tied
 from potto.integrate.pieces import Sums
 from potto.runtime.evaluation.machine import Machine
+from potto.runtime.evaluation.sides import SAME
 from potto.runtime.integration.choices import preferred
 from potto.runtime.integration.problem import Problem
 from potto.runtime.integration.quadrature import in_parts
 
 
 def proved_beforehand(problem: Problem) -> Sums | None:
-    """By the rule of the first order of the variables in which the cuts are apart, if there is a proof for it."""
+    """By the rule of the first order of the variables in which the cuts are apart, if there is a proof for it; by that
+    of the first one where in none they are, and some lie on bounds."""
+    crowded = []
     for order in preferred(problem):
         rule = problem.plan(order).straight
         if rule is None:
@@ -34,8 +38,20 @@ def proved_beforehand(problem: Problem) -> Sums | None:
         try:
             return certain(rule, problem.machine, problem.env)
         except Crowded:
-            continue
-    return None
+            crowded.append(rule)
+    tied = beside_bounds(crowded[0], problem.machine, problem.env) if crowded else None
+    return None if tied is None else _told_apart(problem, tied)
+
+
+def _told_apart(problem: Problem, tied: Tied) -> Sums:
+    """What cuts that lie on bounds make of an integral, with a note where its derivatives to both sides differ."""
+    sums, back, on = tied.whole, tied.backward, tied.forward
+    off = np.maximum(back.et, on.et)
+    if (np.abs(on.t - back.t) <= SAME * (np.abs(on.t) + np.abs(back.t)) + back.et + on.et).all():
+        return replace(sums, t=on.t, et=off)
+    for cause in tied.causes:
+        problem.machine.note(OneSidedDerivatives(cause, back.t, on.t, back.et, on.et), np.arange(1))
+    return sums
 
 
 class Attempt(Struct, frozen=True):
