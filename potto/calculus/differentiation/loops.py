@@ -22,6 +22,7 @@ from potto.core.terms import (
     Sum,
     Term,
     Tuple,
+    add,
     array,
     bound_apart,
     children,
@@ -110,20 +111,33 @@ def dual_fold(node: Fold, tangent: str, start: Term, slope: Term) -> Term:
 
 
 def stepped(root: Term) -> Term:
-    """A term with the folds written out whose state decides a condition, as far as their bounds are known."""
-    if not any(isinstance(node, Fold) for node in postorder(root)):
+    """A term with the folds written out whose state decides a condition, and the sums of conditions that decide one, as
+    far as their bounds are known."""
+    nodes = postorder(root)
+    sums = {
+        part
+        for node in nodes
+        if isinstance(node, Branch)
+        for part in postorder(node.surface)
+        if isinstance(part, Sum) and decided_by((part.variable,), part.body)
+    }
+    if not sums and not any(isinstance(node, Fold) for node in nodes):
         return root
-    return transform(root, lambda _, new: _written_out(new) if isinstance(new, Fold) else new)
+    return transform(root, lambda old, new: _written_out(new, old in sums) if isinstance(new, Fold | Sum) else new)
 
 
-def _written_out(node: Fold) -> Term:
+def _written_out(node: Fold | Sum, decides: bool) -> Term:
     lo, hi = node.lo, node.hi
-    known = isinstance(lo, Const) and isinstance(hi, Const) and 0 <= hi.value - lo.value < MOST_STEPS
-    if not known or not decided_by((node.state,), node.body):
+    if not (isinstance(lo, Const) and isinstance(hi, Const) and 0 <= hi.value - lo.value < MOST_STEPS):
+        return node
+    places = [const(place) for place in range(int(lo.value), int(hi.value) + 1)]
+    if isinstance(node, Sum):
+        return add(*(substitute(node.body, {node.variable: place}) for place in places)) if decides else node
+    if not decided_by((node.state,), node.body):
         return node
     state = node.start
-    for place in range(int(lo.value), int(hi.value) + 1):  # type: ignore[union-attr]
-        state = substitute(node.body, {node.variable: const(place), node.state: state})
+    for place in places:
+        state = substitute(node.body, {node.variable: place, node.state: state})
     return state
 
 
