@@ -86,6 +86,12 @@ def test_one_sided_derivatives(source: str, at: float, value: float, backward: f
     assert found.notes and found.evals <= 16
 
 
+def test_a_bound_that_is_a_cut_as_well() -> None:
+    """Inside of the range [x < 1] is 1 up to the bound."""
+    (note,) = potto.deriv(potto.compile("def f(t) integral [0, 1] [x < 1]*[x > t]*x d(x)").f)((1.0, 1.0)).notes
+    assert (float(note.backward), float(note.forward)) == pytest.approx((-1.0, 0.0), abs=1e-13)
+
+
 def test_a_cut_that_stays_on_a_bound_has_one_derivative() -> None:
     found = potto.deriv(potto.compile("def f(t, s) integral [0, s] (if [x < 1] then x*t else 5) d(x)").f)(
         (2.0, 1.0), 1.0

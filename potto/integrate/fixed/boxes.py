@@ -134,9 +134,9 @@ def _plan(term: Integral, inlined: Term, decided: tuple[Term, ...]) -> Straight:
     frames = tuple(function_of(tuple_(pair)) for pair in term.bounds)
     free = inlined.free.union(*(frame.body.free for frame in frames)) - set(term.variables)
     nothing: tuple[Any, ...] = ((),) * len(frames)
-    turning = (frozenset[int](),) * len(frames)
+    none = (frozenset[int](),) * len(frames)
     surfaces = function_of(tuple_(decided))
-    return Straight(term.variables, frames, nothing, turning, inlined, surfaces, tuple(sorted(free)))
+    return Straight(term.variables, frames, nothing, none, none, inlined, surfaces, tuple(sorted(free)))
 
 
 def sides_of(box: Box, machine: Evaluator, env: dict[str, Value], batch: int) -> Sides | None:

@@ -106,6 +106,8 @@ class OnBounds(Struct):
     def _lies_on(self, plan: Straight, i: int, values: Sequence[Cell], cut: Place, bound: Place) -> bool:
         """Whether it is plain how a cut on a bound moves, the same for all of the variables further out; it is kept."""
         end, row = bound[2], cut[2]
+        if end in plan.shared[i]:  # beyond it other surfaces have another side
+            return False
         if not (plan.items[i][row].free | plan.items[i][end].free).isdisjoint(plan.variables):
             return False
         rate, off = 0.0, 0.0

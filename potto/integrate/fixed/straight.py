@@ -44,15 +44,17 @@ class Straight(Struct, frozen=True, dict=True, eq=False):
     """The terms of an integral for this way: frames per variable (bounds, then cuts), the integrand without calls.
 
     jumps: per variable the surfaces that it crosses, with the rows of the frame that are their places. turning: the
-    rows where something is like a square root. surfaces: what the integrand's branches depend on, as one function to a
-    tuple. names: parameters. regions: what was proved of the rules for cells in a region, None where nothing
-    could be. settled: what is known where the cells are the same all over; None where they are not.
+    rows where something is like a square root. shared: per variable the bounds that are cuts as well. surfaces: what
+    the integrand's branches depend on, as one function to a tuple. names: parameters. regions: what was proved of the
+    rules for cells in a region, None where nothing could be. settled: what is known where the cells are the same all
+    over; None where they are not.
     """
 
     variables: tuple[str, ...]
     frames: tuple[Lam, ...]
     jumps: tuple[tuple[tuple[Term, tuple[int, ...]], ...], ...]
     turning: tuple[frozenset[int], ...]
+    shared: tuple[frozenset[int], ...]
     body: Term
     surfaces: Lam
     names: tuple[str, ...]
@@ -103,7 +105,10 @@ def straight(term: Integral, body: Term, levels: Sequence[LevelPlan]) -> Straigh
         frozenset(place[row] for row, (_, turns) in enumerate(level.rows, 2) if turns)
         for level, place in zip(levels, places, strict=True)
     )
-    return Straight(term.variables, frames, jumps, turning, body, function_of(tuple_(surfaces)), tuple(sorted(free)))
+    shared = tuple(frozenset(place[row] for row in place if row > 1) & {0, 1} for place in places)
+    return Straight(
+        term.variables, frames, jumps, turning, shared, body, function_of(tuple_(surfaces)), tuple(sorted(free))
+    )
 
 
 def nothing(face: Term) -> bool:
