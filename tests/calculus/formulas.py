@@ -108,7 +108,7 @@ def _value(type: Type, rng: random.Random, whole: bool) -> str:
             many = size.number if isinstance(size, Count) else 3
             return f"[{', '.join(_value(item, rng, whole) for _ in range(many))}]"
         case _:
-            return "3" if whole else str(round(rng.uniform(0.2, 0.9), 3))
+            return rng.choice("23") if whole else str(round(rng.uniform(0.2, 0.9), 3))
 
 
 def _function(type: Function, rng: random.Random) -> str:

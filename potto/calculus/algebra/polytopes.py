@@ -142,7 +142,10 @@ def total(parts: list[Coefficient]) -> Coefficient:
             else:
                 terms.append(term)
     whole = add(*terms, const(number)) if terms else const(number)
-    return Coefficient(whole, math.fsum(p.value for p in parts) if terms else number)
+    if not terms:
+        return Coefficient(whole, number)
+    values = [part.value for part in parts]
+    return Coefficient(whole, math.fsum(values) if all(map(math.isfinite, values)) else sum(values))
 
 
 def _product(a: Coefficient, b: Coefficient) -> Coefficient:

@@ -154,8 +154,8 @@ def certain(plan: Straight, machine: Evaluator, env: dict[str, Value]) -> Sums |
 
 
 def beside_bounds(plan: Straight, machine: Evaluator, env: dict[str, Value]) -> Tied | None:
-    """The integral for one set of parameters at which cuts lie on bounds: as they are, and to either side. None where
-    something else about it is not plain.
+    """The integral for one set of parameters at which cuts lie on bounds, to either side, and just there, where it has
+    the derivative of one of them. None where something else about it is not plain.
 
     What lies between such a cut and its bound has the length 0, whether it is counted or not; how far off the value
     may be is the most that it is with it and without, since rounding hides which of them is right.
@@ -179,8 +179,9 @@ def beside_bounds(plan: Straight, machine: Evaluator, env: dict[str, Value]) -> 
         whole, backward, forward = (total(ties.towards(side)) for side in (0, -1, 1))
     except _NotPlain:
         return None
-    error = [max(one.error[0] for one in found.values() if one is not None), *whole.error[1:]]
-    whole = Totals(whole.number, error, whole.gross)
+    near = backward if ties.lie_backward() else forward
+    error = max(one.error[0] for one in found.values() if one is not None)
+    whole = Totals([whole.number[0], *near.number[1:]], [error, *near.error[1:]], whole.gross)
     return Tied(_sums(whole), _sums(backward), _sums(forward), ties.causes(plan))
 
 

@@ -28,7 +28,7 @@ BEYOND, ALONE = 2.0**-20, 4.0
 
 
 class Tied(Struct, frozen=True):
-    """An integral with cuts as they are, to the last digit inside or not; to either side; the surfaces on bounds."""
+    """An integral with cuts on bounds; to either side of the parameters; the surfaces there."""
 
     whole: Sums
     backward: Sums
@@ -52,6 +52,10 @@ class OnBounds(Struct):
         if not side:
             return frozenset(at for at, (_, _, within) in self.met.items() if within)
         return frozenset(at for at, (_, rate, _) in self.met.items() if side * rate > 0 or (rate == 0 and side > 0))
+
+    def lie_backward(self) -> bool:
+        """Whether all cuts that move lie, as computed, where they are before the parameters have come here."""
+        return all(within == (rate < 0) for _, rate, within in self.met.values() if rate)
 
     def causes(self, plan: Straight) -> tuple[TwoSided, ...]:
         """The surfaces that jump there and move."""
