@@ -16,6 +16,7 @@ from potto.integrate.rules.gauss import gauss
 from potto.kernels.cells import Array, Bools
 
 MEAN = (0,)  # the coefficient that is enough where a rule is exact
+ENDS = 2  # of a stretch, behind those nodes at which rounding is followed
 
 
 class Axis(Struct, frozen=True):
@@ -23,7 +24,7 @@ class Axis(Struct, frozen=True):
 
     speeds: how fast they run, as they crowd at turning points, where roots are. transform: (n, rows) from numbers at
     the nodes to the Legendre coefficients that are asked for, the first of which is the mean. few, few_speeds: those
-    nodes at which rounding is followed.
+    nodes at which rounding is followed, then both ends.
     """
 
     nodes: Array
@@ -50,7 +51,14 @@ class Axis(Struct, frozen=True):
                 nodes, speeds = u, np.ones_like(u)
         picked = distinct([0, order // 2, order - 1]) if several else np.arange(order)
         transform = np.ascontiguousarray(rule.transform[:, asked])
-        return cls(nodes, speeds, rule.weights, transform, nodes[picked], speeds[picked])
+        few, few_speeds = np.append(nodes[picked], (0.0, 1.0)), np.append(speeds[picked], _at_ends(turning))
+        return cls(nodes, speeds, rule.weights, transform, few, few_speeds)
+
+
+def _at_ends(turning: tuple[bool, bool]) -> Sequence[float]:
+    """How fast nodes run at both ends: not at all at turning points, twice as fast opposite of one."""
+    low, high = turning
+    return 0.0 if low else 1.0 + high, 0.0 if high else 1.0 + low
 
 
 class Raw(Struct, frozen=True):

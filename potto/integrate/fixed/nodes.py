@@ -13,7 +13,7 @@ import numpy as np
 from msgspec import Struct
 
 from potto.core.terms import Term, function_of, tuple_
-from potto.integrate.fixed.axes import Axis, Raw
+from potto.integrate.fixed.axes import ENDS, Axis, Raw
 from potto.integrate.fixed.edges import EDGE, edges_of
 from potto.integrate.fixed.moving_sums import evaluated, product
 from potto.integrate.fixed.straight import RowNumbers, Straight
@@ -25,7 +25,7 @@ from potto.kernels.cells import Array, Bools, Cell, Ints, Value, map_arrays
 class Nodes(Struct, frozen=True):
     """Numbers at some nodes of cells. value, off: of the integrand and its rounding, (1 + k, ..., n1, M).
 
-    widths: per variable those of its stretches, and how far they may be off, with its own axis left out.
+    widths: per variable those of its stretches, and how far both ends may be off, (2, ...), with its own axis left out.
     clear: (M,) whether no cut comes between, and nothing near by is singular.
     """
 
@@ -33,6 +33,13 @@ class Nodes(Struct, frozen=True):
     off: Array
     widths: list[tuple[Array, Array]]
     clear: Bools
+
+    def without_ends(self) -> Nodes:
+        """Those between the ends of stretches, where rounding is followed at these as well."""
+        outer = len(self.widths) - 1
+        value, off = (block[:, :, *_between(outer)] for block in (self.value, self.off))
+        widths = [(width[:, *_between(i)], lost[:, :, *_between(i)]) for i, (width, lost) in enumerate(self.widths)]
+        return Nodes(value, off, widths, self.clear)
 
 
 def at_once(
@@ -43,9 +50,10 @@ def at_once(
     here = {n: map_arrays(v, lambda a: a[members] if a.ndim else a) for n, v in env.items()}
     cells = _Cells(plan, face, here, rows, axes)
     tracking = machine.tracking()
-    some = cells.at_nodes(tracking, [axis.few for axis in axes], True)
-    every = some
-    if any(len(axis.few) < len(axis.nodes) for axis in axes):
+    few = [axis.few for axis in axes]
+    some = cells.at_nodes(tracking, [*few[:-1], few[-1][:-ENDS]], True)
+    every = some.without_ends()
+    if any(len(axis.few) < len(axis.nodes) + ENDS for axis in axes):
         every = cells.at_nodes(machine, [axis.nodes for axis in axes], False)
     number, coefficients = cells.added(every)
     off, most = cells.rounded(some)
@@ -68,7 +76,9 @@ class _Cells(Struct, frozen=True):
         return int(self.rows.shape[-1])
 
     def at_nodes(self, machine: Evaluator, places: Sequence[Array], tracked: bool) -> Nodes:
-        """The integrand at nodes, per variable; `tracked` where the rounding of nodes counts."""
+        """The integrand at nodes, per variable; `tracked` where the rounding of nodes counts: of all variables but the
+        innermost the last two are then the ends of stretches, which are off by more."""
+        last = len(places) - 1
         here, shape, k = dict(self.env), (self.count,), machine.directions
         clear = np.ones(self.count, dtype=bool)
         widths = []
@@ -77,13 +87,20 @@ class _Cells(Struct, frozen=True):
             numbers, lost = dense(values, k, shape)
             ends = self.picked(numbers, i)
             lo, width = ends[0], ends[1] - ends[0]
-            off = EPS * np.abs(ends).sum(axis=0) + (0.0 if lost is None else self.picked(lost, i).sum(axis=0))
+            off = EPS * np.abs(ends)
+            own = off.sum(axis=0)
+            if lost is not None:
+                off += self.picked(lost, i)
             widths.append((width, off))
             if i:
-                clear &= _clear(numbers[:, 0], ends[:, 0])
+                inside = (slice(None), *_between(i if tracked else 0))
+                clear &= _clear(numbers[:, 0][inside], ends[:, 0][inside])
             at = lo[:, None] + width[:, None] * places[i].reshape(-1, *(1,) * len(shape))
             moves = [any(cell.t[d] is not None for cell in values) for d in range(k)]
-            errors = off if tracked else (None,) * (1 + k)
+            errors: Sequence[Array | None] = (None,) * (1 + k)
+            if tracked:
+                each = [own] * len(places[i]) if i == last else [*[own] * (len(places[i]) - ENDS), *off]
+                errors = list(np.stack(each, axis=1))
             here[variable] = Cell(
                 at[0], errors[0], tuple(at[d] if m else None for d, m in enumerate(moves, 1)),
                 tuple(errors[d] if m else None for d, m in enumerate(moves, 1)),
@@ -112,7 +129,7 @@ class _Cells(Struct, frozen=True):
             return fine
         edges = function_of(tuple_(found))
         for cell in evaluated(edges, machine, {name: still(here[name]) for name in edges.params}):
-            size = np.broadcast_to(np.abs(cell.v), shape).reshape(-1, shape[-1])
+            size = np.broadcast_to(np.abs(cell.v), shape)[:, *_between(len(shape) - 2)].reshape(-1, shape[-1])
             fine &= size.min(axis=0) > EDGE * size.max(axis=0)
         return fine
 
@@ -141,16 +158,33 @@ class _Cells(Struct, frozen=True):
         return number, sizes[::-1]
 
     def rounded(self, nodes: Nodes) -> tuple[Array, Array]:
-        """What rounding may put the integrals off, and what is added up for them, from some nodes: (1 + k, M)."""
+        """What rounding may put the integrals off, and what is added up for them, from some nodes: (1 + k, M).
+
+        Where the end of a stretch is off, the integral is by as much as is integrated further in at that end: next to
+        nothing at the tip of a slim triangle, however far off that is. Nodes are off by their own rounding alone, as
+        they lie between the ends that there are."""
         most, off = np.abs(nodes.value), nodes.off
         for i in reversed(range(len(self.axes))):
-            (width, lost), speeds = nodes.widths[i], self.axes[i].few_speeds
-            speeds = speeds.reshape(-1, *(1,) * (most.ndim - 2))
+            (width, lost), speeds, reach = nodes.widths[i], self.axes[i].few_speeds, None
+            if i + 1 < len(self.axes):
+                reach, fine = (most + off)[:, -ENDS:], speeds[-ENDS:].reshape(-1, *(1,) * (most.ndim - 2)) > 0
+                most, off = most[:, :-ENDS], off[:, :-ENDS]
+            speeds = speeds[:-ENDS].reshape(-1, *(1,) * (most.ndim - 2))
             most, off = (most * speeds).max(axis=1), (off * speeds).max(axis=1)
             size = np.abs(width)
-            off = product(off, size) + product(most, lost)
+            if reach is None:
+                slack = product(most, lost[0] + lost[1])
+            else:
+                low, high = np.where(fine & np.isfinite(reach), reach, most[:, None]).swapaxes(0, 1)
+                slack = product(low, lost[0]) + product(high, lost[1])
+            off = product(off, size) + slack
             most = product(most, size)
         return off, most
+
+
+def _between(count: int) -> tuple[slice, ...]:
+    """Of so many axes of nodes those that are not the ends of stretches."""
+    return (slice(None, -ENDS),) * count
 
 
 def _largest(value: Array) -> Array:

@@ -8,10 +8,12 @@ outermost loop in which all that it needs is known.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import zip_longest
 
 import numpy as np
 
 from potto.core.terms import Term, function_of
+from potto.integrate.fixed.axes import ENDS
 from potto.integrate.fixed.edges import EDGE, edges_of
 from potto.integrate.fixed.formula_text import Dual, Env, FormulaText, Place, Symbol, still
 from potto.integrate.fixed.straight import Straight
@@ -111,7 +113,7 @@ class RuleText(FormulaText):
         """The integral over variable i and those further in. volume: of a node of those further out, with weights."""
         at, k1 = self.at, self.k1
         n, _, _, nodes, speeds, weights, *_ = self.tables[i]
-        low, width, _ = self.stretch(i, env, self.machine)
+        low, width, *_ = self.stretch(i, env, self.machine)
         volume = self.product(volume, width)
         j = at.begin(n)
         speed, weight = at.constant(speeds, j), at.constant(weights, j)
@@ -169,51 +171,70 @@ class RuleText(FormulaText):
                 at.store(at.apply("add", at.load(place), total), place)
         at.end()
 
-    def few(self, i: int, env: Env, bounds: Sequence[tuple[str, str]]) -> tuple[Dual, Dual]:
+    def few(
+        self, i: int, env: Env, bounds: Sequence[tuple[str, str]], outside: Sequence[str] = ()
+    ) -> tuple[Dual, Dual]:
         """The most that is added up from variable i on, and what rounding puts it off, by nodes at which that is
-        followed. bounds: of the edges of builtins."""
+        followed. bounds: of the edges of builtins; outside: masks that say that a variable further out is at an end of
+        its stretch.
+
+        (What an end that is off costs is said in `nodes`. All that is done at a node, and at an end, is written once.)
+        """
         at, k1 = self.at, self.k1
         _, _, n, _, _, _, _, nodes, speeds = self.tables[i]
-        low, width, lost = self.stretch(i, env, self.machine.tracking())
-        slots = [(at.room(1), at.room(1)) for _ in range(k1)]
-        for place in (place for pair in slots for place in pair):
+        last, between = i + 1 == len(self.plan.variables), at.whole("sub", n, ENDS)
+        low, width, own, lost = self.stretch(i, env, self.machine.tracking(), False)
+        slots = [[at.room(1) for _ in range(2 if last else 2 + ENDS)] for _ in range(k1)]
+        for place in (place for row in slots for place in row):
             at.store(self.zero, place)
-        j = at.begin(n)
-        here = {**env, self.plan.variables[i]: self.node(low, width, at.constant(nodes, j), lost)}
-        most: Dual
-        off: Dual
-        if i + 1 == len(self.plan.variables):
-            (cell,) = self.evaluated(self.face, here, self.machine.tracking())
-            most = [self.size(cell.v), *(self.size(self.plain(x)) for x in cell.t)]
-            off = [cell.e, *(cell.et or [None] * (k1 - 1))]
-            self.at_edges(here, bounds)
-        else:
-            most, off = self.few(i + 1, here, bounds)
+        j = at.begin(between if last else n)
+        ends = [] if last else [self.same(j, at.whole("add", between, side)) for side in range(ENDS)]
+        errors = own
+        for mask, side in zip(ends, lost, strict=not last):
+            errors = [self.either(mask, x, y) for x, y in zip(side, errors, strict=True)]
+        here = {**env, self.plan.variables[i]: self.node(low, width, at.constant(nodes, j), errors)}
+        most, off = self.at_node(here, bounds, outside) if last else self.few(i + 1, here, bounds, [*outside, *ends])
         speed = at.constant(speeds, j)
-        for (size, error), x, y in zip(slots, most, off, strict=True):
+        for (size, error, *reach), x, y in zip(slots, most, off, strict=True):
             for place, part in ((size, x), (error, y)):
                 if part is not None:
-                    self.raise_to(place, at.apply("mul", part, speed))
+                    self.raise_to(place, self.unless(ends, at.apply("mul", part, speed)))
+            whole = self.total(x, y)
+            for mask, place in zip(ends, reach, strict=True):
+                at.store(self.either(mask, whole, at.load(place)) or self.zero, place)
         at.end()
-        largest: Dual = [at.load(size) for size, _ in slots]
-        worst: Dual = [at.load(error) for _, error in slots]
-        sizes = [self.size(x) for x in width]
-        errors = map(self.total, self.product(worst, sizes), self.product(largest, lost))
-        return self.product(largest, sizes), list(errors)
+        largest: Dual = [at.load(size) for size, *_ in slots]
+        worst: Dual = [at.load(error) for _, error, *_ in slots]
+        sizes, slack = [self.size(x) for x in width], []
+        for number, side in enumerate(lost):
+            there = largest
+            if not last:
+                plain = at.apply("gt", at.constant(speeds, at.whole("add", between, number)), self.zero)
+                reached = (at.load(row[2 + number]) for row in slots)
+                there = [self.finite_or(x, plain, other) for x, other in zip(reached, largest, strict=True)]
+            slack.append(self.product(there, side))
+        return self.product(largest, sizes), list(map(self.total, self.product(worst, sizes), *slack))
 
-    def at_edges(self, env: Env, bounds: Sequence[tuple[str, str]]) -> None:
+    def at_node(self, env: Env, bounds: Sequence[tuple[str, str]], outside: Sequence[str]) -> tuple[Dual, Dual]:
+        """The size of the integrand, and its rounding."""
+        (cell,) = self.evaluated(self.face, env, self.machine.tracking())
+        self.at_edges(env, bounds, outside)
+        most = [self.size(cell.v), *(self.size(self.plain(x)) for x in cell.t)]
+        return most, [cell.e, *(cell.et or [None] * (self.k1 - 1))]
+
+    def at_edges(self, env: Env, bounds: Sequence[tuple[str, str]], outside: Sequence[str]) -> None:
         here = {name: still(symbol) for name, symbol in env.items()}
         for edge, (least, most) in zip(self.edges, bounds, strict=True):
             (cell,) = self.evaluated(edge, here, self.machine.with_directions(0))
             size = self.at.apply("abs", cell.v)
-            self.at.store(self.at.apply("min", self.at.load(least), size), least)
-            self.raise_to(most, size)
+            self.at.store(self.at.apply("min", self.at.load(least), self.unless(outside, size, np.inf)), least)
+            self.raise_to(most, self.unless(outside, size))
 
     def ends(self, i: int, env: Env, largest: str) -> None:
         """The largest value at the corners of cells, where these are looked at."""
         at, machine = self.at, self.machine.with_directions(0)
         asked = at.address("%frame", HEAD - 1)
-        low, width, _ = self.stretch(i, env, machine, False)
+        low, width, *_ = self.stretch(i, env, machine, False)
         j = at.begin(asked)
         node = at.spread(at.once(f"uitofp i64 {j} to double", j))
         here = {**env, self.plan.variables[i]: self.node(low, width, node)}
@@ -226,9 +247,12 @@ class RuleText(FormulaText):
 
     # Stretches and nodes
 
-    def stretch(self, i: int, env: Env, machine: Evaluator, checked: bool = True) -> tuple[Dual, Dual, Dual]:
-        """The lower end, the length, and how far off both are; where another cut comes between, that is noted."""
-        at, k1 = self.at, 1 + machine.directions
+    def stretch(
+        self, i: int, env: Env, machine: Evaluator, checked: bool = True
+    ) -> tuple[Dual, Dual, Dual, list[Dual]]:
+        """The lower end, the length, how far rounding puts nodes off, and how far off both ends are; where another cut
+        comes between, that is noted."""
+        at = self.at
         cells = self.evaluated(self.plan.frames[i], env, machine)
         low, high = (self.chosen(cells, row) for row in self.rows[i])
         lower, upper = [low.v, *low.t], [high.v, *high.t]
@@ -238,12 +262,13 @@ class RuleText(FormulaText):
             for cell in cells:
                 between = at.apply("and", at.apply("gt", cell.v, low.v), at.apply("lt", cell.v, high.v))
                 self.only(at.apply("not", between))
-        errors = ([low.e, *low.et], [high.e, *high.et])
-        lost = []
-        for c in range(k1):
-            ends = self.total(self.size(lower[c]), self.size(upper[c]))
-            lost.append(self.total(self.times(ends, at.number(EPS)), *(row[c] for row in errors if len(row) > c)))
-        return lower, width, lost
+        rounding = [[self.times(self.size(x), at.number(EPS)) for x in end] for end in (lower, upper)]
+        own, lost = [], []
+        for x, y in zip(*rounding, strict=True):
+            own.append(self.total(x, y))
+        for end, row in zip((low, high), rounding, strict=True):
+            lost.append([self.total(x, error) for x, error in zip_longest(row, (end.e, *end.et))])
+        return lower, width, own, lost
 
     def chosen(self, cells: Sequence[Symbol], row: str) -> Symbol:
         """Of the rows of a frame the one with this number."""
@@ -272,6 +297,25 @@ class RuleText(FormulaText):
         return Symbol(at[0], lost[0] if lost else None, tuple(at[1:]), tuple(
             None if moves is None else error for moves, error in zip(at[1:], errors, strict=True)
         ))  # fmt: skip
+
+    def same(self, j: str, other: str) -> str:
+        """Whether two whole numbers are the same, as a mask."""
+        one, two = (self.at.spread(self.at.once(f"uitofp i64 {x} to double", x)) for x in (j, other))
+        return self.at.apply("eq", one, two)
+
+    def either(self, mask: str, x: str | None, y: str | None) -> str | None:
+        """The first where the mask holds, else the second."""
+        return None if x is y is None else self.at.apply("select", mask, x or self.zero, y or self.zero)
+
+    def unless(self, masks: Sequence[str], x: str, other: float = 0.0) -> str:
+        """A number where none of the masks holds."""
+        for mask in masks:
+            x = self.at.apply("select", mask, self.at.number(other), x)
+        return x
+
+    def finite_or(self, x: str, mask: str, other: str | None) -> str | None:
+        """A number where it is finite and the mask holds, else another."""
+        return self.either(self.at.apply("and", mask, self.at.apply("lt", x, self.at.number(np.inf))), x, other)
 
     def finite(self, size: str) -> str:
         return self.at.apply("select", self.at.apply("lt", size, self.at.number(np.inf)), size, self.zero)
