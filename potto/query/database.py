@@ -139,6 +139,7 @@ class Database(Engine):
             memo = memos[args] = Memo(query, args)
         elif memo.verified_at >= self.revision:
             return memo
+        memo.break_ring()
         memo.put(value, self.revision, self._changes[self.revision])
         self._depend(memo, dict.fromkeys(deps))
         return memo

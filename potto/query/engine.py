@@ -27,6 +27,7 @@ from potto.query.nodes import (
     Memo,
     Node,
     Query,
+    Strayed,
     drop,
     has_returned,
     short,
@@ -56,6 +57,7 @@ class Engine:
         self._evaluation, self._cancelled = 1, 0  # the numbers of the present evaluation and of the one to cancel
         self._frame: dict[Node, None] | None = None  # what the running query has read
         self._running: list[Memo] = []
+        self._floor = 0  # the lowest place among these that a cycle may reach
         self._provisional: list[Memo] = []  # finished members of a cycle whose first query still runs
         self._events: list[Event] | None = None
         self._print = "query" in os.environ.get("POTTO_LOG", "").split(",")
@@ -114,8 +116,12 @@ class Engine:
         return memo
 
     def _refresh(self, root: Memo) -> None:
-        """Bring a memo up to date, starting with the nodes that it reads. Does not recurse."""
-        stack, places, revision = [root], [0], self.revision
+        """Bring a memo up to date, starting with the nodes that it reads. Does not recurse.
+
+        What is run ahead of its turn (a leaf, or what another member of the cycle has read) might not be read at all by
+        the queries that run now. So it must not close a cycle with them: their places are below its floor.
+        """
+        stack, places, floors, revision = [root], [0], [self._floor], self.revision
         while stack:
             memo = stack[-1]
             if memo.verified_at >= revision:
@@ -125,18 +131,15 @@ class Engine:
             else:
                 below = self._verify(memo, places)
                 if isinstance(below, Memo):
+                    floors.append(len(self._running) if places[-1] < 0 or memo.ring else floors[-1])
                     stack.append(below)
                     places.append(0)
                     continue
                 must_run = below
-            while must_run:
-                must_run = not self._run_again(memo, memo is root)
-                if must_run:  # it failed or was dropped: its readers must run to find out
-                    stack.pop()
-                    places.pop()
-                    memo = stack[-1]
-            stack.pop()
-            places.pop()
+            while must_run and not self._run_again(memo, memo is root, floors[-1]):
+                del stack[-1], places[-1], floors[-1]  # it failed, strayed or was dropped: its readers must run
+                memo = stack[-1]
+            del stack[-1], places[-1], floors[-1]
 
     def _verify(self, memo: Memo, places: list[int]) -> Memo | bool:
         """Continue verifying a memo from `places[-1]`: True if it must run, False if it stands, or the node to do
@@ -145,8 +148,7 @@ class Engine:
         Nodes are checked in the order in which they were read. One is looked at only if all those before it stand;
         otherwise the query might not read it any more. What has come back stands, but is seen here alone, where all
         that the memo read is up to date: were it seen in the leaves (`_stands`), what lies between might be of another
-        time. Members of a cycle, which have been seen at different times, must run together or stand together: for
-        them it counts as changed.
+        time.
         """
         revision, since, last_changed = self.revision, memo.verified_at, self._last_changed
         stands: bool | Memo = last_changed[memo.durability] <= since
@@ -172,7 +174,7 @@ class Engine:
                     else:
                         places[-1] = place
                         return source
-                if dep.changed_at > since and (memo.cyclic or not has_returned(dep, since)):
+                if dep.changed_at > since and not has_returned(dep, since):
                     return True
             for dep in deps:
                 if dep.durability < durability:
@@ -240,7 +242,7 @@ class Engine:
         """Whether a memo can be run before the memos between it and its reader."""
         return memo.index < 0 and not memo.provisional and self._memos[memo.query].get(memo.args) is memo
 
-    def _run_again(self, memo: Memo, asked: bool) -> bool:
+    def _run_again(self, memo: Memo, asked: bool, floor: int) -> bool:
         """Run a stale memo. False if this gave no value and nobody asked for it directly."""
         table = self._memos[memo.query]
         if asked:
@@ -249,10 +251,17 @@ class Engine:
             return True
         if table.get(memo.args) is not memo:
             return False
+        before, self._floor = self._floor, floor
         try:
             self._run(memo)
         except Exception:
             return False  # not swallowed: its reader runs next and gets the same exception
+        except Strayed:
+            if floor < len(self._running):  # the query that was run ahead is among them
+                raise
+            return False
+        finally:
+            self._floor = before
         return memo.verified_at >= self.revision
 
     # Running
@@ -264,6 +273,7 @@ class Engine:
         index, caller, mark = len(self._running), self._frame, len(self._provisional)
         frame: dict[Node, None] = {}
         fresh = memo.value is GONE and memo.verified_at < 0
+        memo.break_ring()
         memo.index, memo.low, memo.cyclic = index, index, False
         self._running.append(memo)
         self._frame = frame
@@ -320,7 +330,8 @@ class Engine:
         memo.verified_at = self.revision if durability < DURABILITIES else FOREVER
 
     def _fail(self, memo: Memo, frame: dict[Node, None], mark: int, fresh: bool, failed: bool) -> None:
-        """Leave no half-made answers. A cancelled memo stays as it was; a failed one counts as changed."""
+        """Leave no half-made answers. A cancelled memo stays as it was, unless it was given the value of its fallback;
+        a failed one counts as changed."""
         for member in self._provisional[mark:]:
             member.provisional = False
             drop(self._memos[member.query], [member])
@@ -331,6 +342,8 @@ class Engine:
             memo.put_error(durability, self.revision, self._changes[self.revision])
         elif fresh:
             self._memos[memo.query].pop(memo.args, None)
+        elif memo.cyclic:
+            memo.verified_at = -1
 
     def _on_fresh_stack(self, function: Callable[..., Any], args: tuple[Hashable, ...]) -> Any:
         """Call a function on a new thread, which owns the database while this one waits."""
@@ -364,6 +377,8 @@ class Engine:
     def _meet_cycle(self, memo: Memo) -> None:
         """The running query asks for one that is running, or for a finished member of a cycle that is still open."""
         low = memo.index if memo.index >= 0 else memo.low
+        if low < self._floor:
+            raise Strayed
         for above in self._running[low + 1 :]:
             above.low = min(above.low, low)
         self._running[low].cyclic = True
@@ -375,11 +390,11 @@ class Engine:
         memo.put(memo.query.fallback(self, *memo.args), self.revision, self._changes[self.revision])
 
     def _close_cycle(self, first: Memo, mark: int) -> None:
-        """Make all members of a cycle depend on everything that any of them read outside it."""
-        members = [*self._provisional[mark:], first]
+        """Make a ring of the members of a cycle: all depend on everything that any of them read outside it."""
+        ring = tuple(dict.fromkeys((*self._provisional[mark:], first)))
         del self._provisional[mark:]
-        inside = set(members)
-        outside = dict.fromkeys(dep for member in members for dep in member.deps if dep.source not in inside)
-        for member in members:
-            member.provisional, member.cyclic = False, True
+        inside = set(ring)
+        outside = dict.fromkeys(dep for member in ring for dep in member.deps if dep.source not in inside)
+        for member in ring:
+            member.join(ring, self.revision, self._changes[self.revision])
             self._depend(member, outside)

@@ -19,6 +19,10 @@ class Cancelled(BaseException):
     """The evaluation was cancelled. This is no `Exception`, so that handlers of errors let it through."""
 
 
+class Strayed(BaseException):
+    """A query that was run only to verify another one meets a query that was running before: it is abandoned."""
+
+
 class CycleError(Exception):
     """A query needs its own answer and has no fallback. An internal error; its text shows the cycle."""
 
@@ -93,8 +97,8 @@ class Memo:
     """The answer of a query for its arguments.
 
     `index` is its place on the stack of running queries, or -1. `low` is the lowest place that it reaches through a
-    cycle. `cyclic`: it is part of a cycle; while it runs, one leads back to it. `provisional`: it has finished, but its
-    cycle has not.
+    cycle. `cyclic`: it runs, and a cycle leads back to it. `provisional`: it has finished, but its cycle has not.
+    `ring`: the cycle that it is part of, itself included. Its members run together, see `break_ring`.
 
     `leaves` are the nodes of durability 0 that it depends on in the end: inputs, entries of tables, and memos known or
     declared to absorb most edits (`cuts`). The memo stands as long as no leaf and nothing durable changes. None if
@@ -120,6 +124,7 @@ class Memo:
         "low",
         "provisional",
         "query",
+        "ring",
         "source",
         "value",
         "verified_at",
@@ -136,10 +141,26 @@ class Memo:
         self.former: Former | None = None
         self.again: Former | None = None
         self.index, self.low, self.cyclic, self.provisional = -1, 0, False, False
+        self.ring: tuple[Memo, ...] = ()
         self.source = self
 
     def __repr__(self) -> str:
         return f"{self.query.name}({', '.join(short(arg) for arg in self.args)})"
+
+    def break_ring(self) -> None:
+        """Make all members of its cycle run when they are next asked for. An answer that was found inside a cycle says
+        nothing to one that runs by itself: it would take it for an answer from outside."""
+        for member in self.ring:
+            member.ring, member.verified_at = (), -1
+
+    def join(self, ring: tuple[Memo, ...], revision: int, changes: set[Node]) -> None:
+        """Become a member of a cycle that has just closed. This counts as a change, even if the value is the old one:
+        what lies between a reader and this may be another member now, with another value."""
+        self.ring, self.provisional = ring, False
+        nodes: list[Node] = [self, *(self.entries or {}).values()]
+        for node in nodes:
+            node.changed_at = revision
+        changes.update(nodes)
 
     def put(self, value: Any, revision: int, changes: set[Node]) -> None:
         """Set the value. If it is equal, nothing has changed and the old object stays. Whatever others may have read
@@ -262,6 +283,7 @@ def drop(table: dict[tuple[Hashable, ...], Memo], memos: list[Memo]) -> int:
     for memo in memos:
         if memo.index < 0 and not memo.provisional and table.pop(memo.args, None) is not None:
             memo.value, memo.entries, memo.former = GONE, None, None
+            memo.break_ring()
             dropped += 1
     return dropped
 
