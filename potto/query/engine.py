@@ -136,9 +136,11 @@ class Engine:
                     places.append(0)
                     continue
                 must_run = below
-            while must_run and not self._run_again(memo, memo is root, floors[-1]):
-                del stack[-1], places[-1], floors[-1]  # it failed, strayed or was dropped: its readers must run
-                memo = stack[-1]
+            while must_run:
+                must_run = not self._run_again(memo, memo is root, floors[-1])
+                if must_run:  # it failed, strayed or was dropped: its readers must run
+                    del stack[-1], places[-1], floors[-1]
+                    memo = stack[-1]
             del stack[-1], places[-1], floors[-1]
 
     def _verify(self, memo: Memo, places: list[int]) -> Memo | bool:
