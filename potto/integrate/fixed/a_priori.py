@@ -24,7 +24,7 @@ from potto.core.terms import children
 from potto.integrate.fixed.alone import Face, machine_code, promotion, summed_alone, summed_by
 from potto.integrate.fixed.moving_sums import Totals, evaluated, summed
 from potto.integrate.fixed.on_bounds import OnBounds, Place, Tied
-from potto.integrate.fixed.regions import LOOSEST, Path, known, region_of, settle
+from potto.integrate.fixed.regions import LOOSEST, Path, Places, known, region_of, settle
 from potto.integrate.fixed.straight import CLEAR, Straight, nothing
 from potto.integrate.pieces import Evaluator, Sums
 from potto.integrate.rules.gauss import EPS
@@ -196,14 +196,23 @@ def _between(
     if not cells:
         nothing = [0.0] * (1 + machine.directions)
         return Totals(nothing, nothing, nothing)
-    proof = region_of(plan, cells, values, reach, shortest, rtol) if len(cells) <= MOST_CELLS else None
-    if proof is None or sum(proof[0].outer) * math.prod(proof[0].inner) > MOST_NODES:
+    proof = _proved(plan, cells, values, reach, shortest, rtol)
+    if proof is None:
         return None
     totals = summed(plan.variables, plan.frames, proof[0], machine, env, frame, ties.put)
     if totals is None:
         return None
     machine.count(totals.nodes)
     return _accurate(totals, _truncation(plan, proof[0], machine.directions, env), machine.rtol, machine.atol)
+
+
+def _proved(
+    plan: Straight, cells: tuple[Stretch, ...], values: dict[str, float], reach: float, shortest: float, rtol: float
+) -> tuple[Region, Places] | None:
+    """As `region_of`; None, too, where there are more cells or nodes than can be afforded."""
+    proof = region_of(plan, cells, values, reach, shortest, rtol) if len(cells) <= MOST_CELLS else None
+    few = proof is not None and sum(proof[0].outer) * math.prod(proof[0].inner) <= MOST_NODES
+    return proof if few else None
 
 
 def _sums(found: Totals) -> Sums:
@@ -233,8 +242,8 @@ def _summed(plan: Straight, machine: Evaluator, env: dict[str, Value]) -> Totals
         if not cells:
             nothing = [0.0] * (1 + machine.directions)
             return Totals(nothing, nothing, nothing)
-        proof = region_of(plan, cells, values, reach, shortest, rtol) if len(cells) <= MOST_CELLS else None
-        if proof is None or sum(proof[0].outer) * math.prod(proof[0].inner) > MOST_NODES:
+        proof = _proved(plan, cells, values, reach, shortest, rtol)
+        if proof is None:
             return None
         region = proof[0]
         if certain:
