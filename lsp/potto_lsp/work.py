@@ -134,6 +134,10 @@ class Worker:
         except StopIteration:
             self._steps, self._urgent = None, False
             return None
+        except Exception:  # the rest of idle work is lost until the next edit; whoever asks is answered
+            logger.error("idle work failed", exc_info=True)
+            self._steps, self._urgent = None, False
+            return None
         if step is None:
             self._urgent = False
             return None

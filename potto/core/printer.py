@@ -315,13 +315,19 @@ def _comparison(node: Branch, holds: bool, texts: _Texts) -> _Text:
 
 
 def _sides(surface: Term, texts: _Texts) -> tuple[str, str, bool]:
-    """less, more with surface = more - less, and whether to write the greater one first."""
-    match surface:
-        case Prim(op="add", args=(Prim(op="neg", args=(a,)), b)) | Prim(op="add", args=(b, Prim(op="neg", args=(a,)))):
-            return texts[a].at(_ADD), texts[b].at(_ADD), False
-        case Prim(op="neg", args=(a,)):
-            return texts[a].at(_ADD), "0", False
-        case Prim(op="add", args=(a, Const(value=value, name=None))) if value < 0:
-            return _number(-value).text, texts[a].at(_ADD), True
-        case _:
-            return "0", texts[surface].at(_ADD), True
+    """less, more with surface = more - less, and whether to write the greater one first: what is taken away against
+    what is added, with a number where it has no minus sign; against the number, where there is only one of the two."""
+    parts = surface.args if isinstance(surface, Prim) and surface.op == "add" else (surface,)
+    numbers = [p for p in parts if isinstance(p, Const) and p.name is None]
+    if len(numbers) == len(parts):
+        return "0", texts[surface].at(_ADD), True
+    taken = [texts[p.args[0]] for p in parts if isinstance(p, Prim) and p.op == "neg"]
+    added = [texts[p] for p in parts if p not in numbers and not (isinstance(p, Prim) and p.op == "neg")]
+    if taken and added:
+        for number in numbers:
+            (added if number.value > 0 else taken).append(_number(abs(number.value)))
+        return _sum(taken), _sum(added), False
+    value = sum(p.value for p in numbers)
+    if taken:
+        return _sum(taken), _number(value).text, False
+    return _number(-value if value else 0.0).text, _sum(added), True

@@ -61,8 +61,23 @@ def test_what_never_holds_is_not_shown_and_roots_of_decimals_are_decimals() -> N
     file = library.put("<text>", "def f(t, c) integral [t, t + 1] [abs(x - t) < c/3] d(x)\n"
                        "def g(t) integral [t, t + 1] [(x - t)^2 < 0.04] d(x)\n")  # fmt: skip
     shown = explain_derivative(library.db, file, "f").tangent
-    assert shown == "dt*[c/3 > 1] - dt*[c > 0] + (dc/3 + dt)*[c > 0 and c/3 < 1]"
+    assert shown == "dt*[c > 3] - dt*[c > 0] + (dc/3 + dt)*[c > 0 and c < 3]"
     assert "t - 0.2" in (found := explain_derivative(library.db, file, "g").tangent) and "sqrt" not in found
+
+
+@pytest.mark.parametrize(
+    ("condition", "read"),
+    [
+        ("x + 2*y < t", "[x < t and t < x + 2]"),
+        ("x^2 + y^2 < t^2", "[x^2 < t^2 and t^2 < x^2 + 1]"),
+        ("x + y + t >= 0", "[t + x < 0 and t + x > -1]"),
+    ],
+)
+def test_what_has_two_bounds_stands_between_them(condition: str, read: str) -> None:
+    """Also where one of them is found of half of it, or of it with its sign turned."""
+    library = Library()
+    file = library.put("<text>", f"def f(t) integral ([0, 1], [0, 1]) [{condition}] d(x, y)\n")
+    assert read in explain_derivative(library.db, file, "f").tangent
 
 
 def test_numbers_are_decimals() -> None:

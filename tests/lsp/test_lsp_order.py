@@ -101,6 +101,21 @@ def test_a_question_about_a_whole_file_does_not_stop_the_diagnostics_of_an_open_
     assert world.finished() == ["edit", "open begins", "open ends", "pull", "lenses"]
 
 
+def test_idle_work_that_fails_leaves_questions_answered() -> None:
+    world = World()
+
+    def steps() -> Iterator[Callable[[], None] | None]:
+        raise ZeroDivisionError("a bug")
+        yield None
+
+    world.worker = Worker(lambda: world.db, steps)
+    world.put("edit", "edit")
+    world.worker.start()
+    answered = Event()
+    world.worker.put(Job("quick", lambda job: answered.set()))
+    assert answered.wait(10) and world.done == ["edit"]
+
+
 def test_a_question_about_a_whole_file_gives_way_to_quick_ones_and_comes_back() -> None:
     world = World(opened=0, closed=0)
     world.worker.put(Job("slow", world.long("lenses")))

@@ -1,24 +1,26 @@
 """Iverson brackets as conditions, in as few and as plain comparisons as they can be told.
 
 Owns `Condition`, `conditions`, `fewer` and `bracket`. A root is compared by squares, factors that do not change a sign
-are left out, and so is what another condition implies.
+are left out, and so is what another condition implies. What two conditions hold between numbers stands between them:
+`-1 < c + x < 0` is c < -x and c + x + 1 > 0.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from fractions import Fraction
+from math import gcd, lcm
 
 from msgspec import Struct
 
 from potto.calculus.algebra.ranges import range_of
 from potto.calculus.algebra.rational_form import as_term, normal
 from potto.core.polynomials import Polynomial
+from potto.core.printer import format_term
 from potto.core.terms import (
     ONE,
     ZERO,
     Branch,
-    Const,
     Prim,
     Term,
     add,
@@ -28,6 +30,9 @@ from potto.core.terms import (
     neg,
     sub,
 )
+
+_MONOMIALS = 6  # of what is written anew between its bounds
+_COEFFICIENT = 64  # the largest; multiples of decimal fractions are no plainer
 
 
 class Condition(Struct, frozen=True):
@@ -74,35 +79,70 @@ def fewer(known: Iterable[Condition]) -> list[Condition]:
 def bracket(known: Sequence[Condition]) -> Term:
     """1 where all conditions hold, else 0."""
     whole: Term = ONE
-    for item in known:  # the last one is the first that is asked
-        whole = branch((sided(item.surface),), item.strict, whole, ZERO)
+    for item in _between(known):  # the last one is the first that is asked
+        whole = branch((item.surface,), item.strict, whole, ZERO)
     return whole
+
+
+class _Bound(Struct, frozen=True):
+    """What a condition says of a polynomial without a constant whose coefficients are integers without a common factor:
+    that it is above `number`, or if `turned`, below it. scaled: whether the condition said so of a multiple of it."""
+
+    of: Polynomial
+    number: Fraction
+    turned: bool
+    scaled: bool
+
+
+def _between(known: Sequence[Condition]) -> list[Condition]:
+    """The same conditions: two bounds of one thing beside each other and alike, so that it stands between them, and no
+    fraction of anything."""
+    bounds = [_bound(item.surface) for item in known]
+    found: list[Condition] = []
+    done: set[int] = set()
+    for i, bound in enumerate(bounds):
+        both = (
+            [] if bound is None else [j for j, other in enumerate(bounds) if other is not None and other.of == bound.of]
+        )
+        for j in () if i in done else sorted({i, *both}):
+            done.add(j)
+            other = bounds[j]
+            surface = None if other is None or (len(both) == 1 and not other.scaled) else _surface(other)
+            found.append(known[j] if surface is None else Condition(surface, known[j].strict))
+    return found
+
+
+def _bound(surface: Term) -> _Bound | None:
+    found = normal(surface)
+    if found is None or set(found.below) != {()}:
+        return None
+    top = {m: Fraction(c) / found.below[()] for m, c in found.top.items()}
+    offset = top.pop((), Fraction(0))
+    if not 0 < len(top) <= _MONOMIALS:
+        return None
+    scale = Fraction(gcd(*(c.numerator for c in top.values())), lcm(*(c.denominator for c in top.values())))
+    below = sum(c < 0 for c in top.values())
+    first = min(top, key=lambda m: [(format_term(a), n) for a, n in m])
+    turned = 2 * below > len(top) or (2 * below == len(top) and top[first] < 0)
+    whole = {m: c / (-scale if turned else scale) for m, c in top.items()}
+    if any(abs(c) > _COEFFICIENT for c in whole.values()):
+        return None
+    return _Bound(whole, (offset if turned else -offset) / scale, turned, scale != 1)
+
+
+def _surface(bound: _Bound) -> Term | None:
+    """It, as what is added against what is taken away and the number."""
+    added = as_term({m: c for m, c in bound.of.items() if c > 0})
+    taken = as_term({m: -c for m, c in bound.of.items() if c < 0} | ({(): bound.number} if bound.number else {}))
+    if added is None or taken is None:
+        return None
+    return sub(taken, added) if bound.turned else sub(added, taken)
 
 
 def opposite(first: Condition, second: Condition) -> bool:
     """Whether one surface is the other with its sign turned."""
     found = normal(add(first.surface, second.surface))
     return first.strict and second.strict and found is not None and not found.top
-
-
-def sided(surface: Term) -> Term:
-    """What is added less what is taken away, so that it reads as a comparison of the two."""
-    if isinstance(surface, Prim) and surface.op == "neg":
-        surface = _turned(surface.args[0])
-    parts = surface.args if isinstance(surface, Prim) and surface.op == "add" else (surface,)
-    taken = [p.args[0] for p in parts if isinstance(p, Prim) and p.op == "neg"]
-    added = [p for p in parts if not (isinstance(p, Prim) and p.op == "neg")]
-    numbers = [p for p in added if isinstance(p, Const) and p.name is None]
-    if added == numbers and taken and numbers and numbers[0].value > 0:
-        return sub(add(*added), add(*taken))
-    return sub(add(*added), add(*taken)) if taken and added else surface
-
-
-def _turned(term: Term) -> Term:
-    """A term with its sign turned, a sum part by part."""
-    if isinstance(term, Prim) and term.op == "add":
-        return add(*map(neg, term.args))
-    return neg(term)
 
 
 def _plain(item: Condition) -> list[Condition]:

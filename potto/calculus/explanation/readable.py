@@ -16,7 +16,7 @@ from msgspec import Struct
 from potto.calculus.algebra.ranges import Range, range_of
 from potto.calculus.algebra.rational_form import Rational, normal
 from potto.calculus.explanation.brackets import bracket as bracket_of
-from potto.calculus.explanation.brackets import conditions, fewer, opposite, sided
+from potto.calculus.explanation.brackets import conditions, fewer, opposite
 from potto.calculus.explanation.factors import Factors, factored, is_tangent, written
 from potto.calculus.surfaces.branch_assignment import box_of
 from potto.core.polynomials import Monomial, Polynomial, shared_by, without
@@ -169,8 +169,6 @@ class _Work:
                 known = conditions(node)
                 if known is not None:
                     return bracket_of(fewer(known))
-                if len(node.coordinates) == 1:
-                    return branch((sided(node.surface),), node.strict, node.then, node.orelse)
                 return node
             case Prim(op="hypot"):
                 return _length(node)
