@@ -118,8 +118,11 @@ class Engine:
     def _refresh(self, root: Memo) -> None:
         """Bring a memo up to date, starting with the nodes that it reads. Does not recurse.
 
-        What is run ahead of its turn (a leaf, or what another member of the cycle has read) might not be read at all by
-        the queries that run now. So it must not close a cycle with them: their places are below its floor.
+        A memo that must run is looked at as it was `before`: if that stands, its answer is recalled.
+
+        What is run ahead of its turn (a leaf, or what another member of the cycle or an earlier run has read) might not
+        be read at all by the queries that run now. So it must not close a cycle with them: their places are below its
+        floor.
         """
         stack, places, floors, revision = [root], [0], [self._floor], self.revision
         while stack:
@@ -129,16 +132,24 @@ class Engine:
             elif memo.verified_at < 0:
                 must_run = True
             else:
-                below = self._verify(memo, places)
+                below, before = self._verify(memo, places), memo.before
                 if isinstance(below, Memo):
                     floors.append(len(self._running) if places[-1] < 0 or memo.ring else floors[-1])
                     stack.append(below)
                     places.append(0)
                     continue
+                if below and before is not None:
+                    if before.verified_at < revision:
+                        floors.append(len(self._running))
+                        stack.append(before)
+                        places.append(-LEAVES_FIRST)
+                        continue
+                    memo.recall(before, revision, self._changes[revision])
+                    below = False
                 must_run = below
             while must_run:
                 must_run = not self._run_again(memo, memo is root, floors[-1])
-                if must_run:  # it failed, strayed or was dropped: its readers must run
+                if must_run:  # it failed, strayed, was dropped or is of `before`: its readers must run
                     del stack[-1], places[-1], floors[-1]
                     memo = stack[-1]
             del stack[-1], places[-1], floors[-1]
@@ -274,7 +285,7 @@ class Engine:
             raise Cancelled
         index, caller, mark = len(self._running), self._frame, len(self._provisional)
         frame: dict[Node, None] = {}
-        fresh = memo.value is GONE and memo.verified_at < 0
+        fresh, before = memo.value is GONE and memo.verified_at < 0, memo.kept()
         memo.break_ring()
         memo.index, memo.low, memo.cyclic = index, index, False
         self._running.append(memo)
@@ -287,6 +298,7 @@ class Engine:
             if not fresh and memo.changed_at == changed_at:
                 memo.cuts = True
             self._depend(memo, frame)
+            memo.before = before or memo.before
         except BaseException as error:
             self._fail(memo, frame, mark, fresh, isinstance(error, Exception))
             raise

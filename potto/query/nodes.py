@@ -105,12 +105,15 @@ class Memo:
     there are too many, or if they are not known. `found` collects everything below many leaves, once it was needed.
 
     `former` is the value before this one; `again` says when it had this one before, if it has come back. A mistake is
-    mended, an edit is taken back: then all that was not asked for meanwhile stands.
+    mended, an edit is taken back: then all that was not asked for meanwhile stands. For what was asked for, `before`
+    is this memo as it stood before its last run, outside the database's tables: if all that it had read is as it was
+    then, its answer is recalled.
     """
 
     __slots__ = (
         "again",
         "args",
+        "before",
         "changed_at",
         "cuts",
         "cyclic",
@@ -140,6 +143,7 @@ class Memo:
         self.entries: dict[Any, Entry] | None = None
         self.former: Former | None = None
         self.again: Former | None = None
+        self.before: Memo | None = None
         self.index, self.low, self.cyclic, self.provisional = -1, 0, False, False
         self.ring: tuple[Memo, ...] = ()
         self.source = self
@@ -152,6 +156,23 @@ class Memo:
         nothing to one that runs by itself: it would take it for an answer from outside."""
         for member in self.ring:
             member.ring, member.verified_at = (), -1
+
+    def kept(self) -> Memo | None:
+        """This memo as it stands, for `before`. Of a member of a cycle nothing is kept: its answer rests on more than
+        what it has read."""
+        if self.value is GONE or self.verified_at < 0 or self.ring or self.durability:
+            return None
+        memo = Memo(self.query, self.args)
+        memo.value, memo.deps, memo.leaves, memo.verified_at = self.value, self.deps, self.leaves, self.verified_at
+        return memo
+
+    def recall(self, before: Memo, revision: int, changes: set[Node]) -> None:
+        """Become again what it was before its last run, which is kept in turn."""
+        self.before = self.kept()
+        self.break_ring()
+        self.put(before.value, revision, changes)
+        self.deps, self.leaves, self.durability = before.deps, before.leaves, before.durability
+        self.verified_at = before.verified_at
 
     def join(self, ring: tuple[Memo, ...], revision: int, changes: set[Node]) -> None:
         """Become a member of a cycle that has just closed. This counts as a change, even if the value is the old one:
@@ -282,7 +303,7 @@ def drop(table: dict[tuple[Hashable, ...], Memo], memos: list[Memo]) -> int:
     dropped = 0
     for memo in memos:
         if memo.index < 0 and not memo.provisional and table.pop(memo.args, None) is not None:
-            memo.value, memo.entries, memo.former = GONE, None, None
+            memo.value, memo.entries, memo.former, memo.before = GONE, None, None, None
             memo.break_ring()
             dropped += 1
     return dropped
