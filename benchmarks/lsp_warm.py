@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import gc
 import os
-import re
 import sys
 import tempfile
 import time
@@ -17,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from installed import front_end
-from lsp_workspace import workspace
+from lsp_workspace import resigned, workspace
 from potto_lsp import memory
 from potto_lsp.analysis import Analysis
 from potto_lsp.client import Client
@@ -85,19 +84,12 @@ def show(what: str, edits: Callable[[int], Times]) -> None:
         )
 
 
-def renamed(leaf: str, name: str) -> str:
-    """The leaf with another name for the second parameter of what its importers use."""
-    first, *others = re.split(r"(?m)^(?=def )", leaf)
-    return first + "".join(re.sub(r"\bk\b", name, d) if d.startswith(("def f0(", "def f1(")) else d for d in others)
-
-
 def main() -> None:
     arrays = "--arrays" in sys.argv
     texts = workspace(arrays)
     large, leaf = texts["large"], texts["m0"]
     users = [name for name, text in texts.items() if "from m0 import f1 " in text or "import m0 as" in text][:3]
     at = large.index("sin(", len(large) // 2)
-    changed = leaf.replace("def f1(t, k)", "def f1(t)").replace("def f0(t, k)", "def f0(t)")
     with tempfile.TemporaryDirectory() as folder, tempfile.TemporaryDirectory() as cache:
         os.environ["POTTO_CACHE"] = cache
         for name, text in texts.items():
@@ -111,10 +103,10 @@ def main() -> None:
         show("a bracket too many in it", lambda n: session.edit("large", broken[n % 2], {"large"}))
         moved = ["\n" + large, large]
         show("a line at its top", lambda n: session.edit("large", moved[n % 2], {"large"}))
-        heads = [changed, leaf]
-        show("signature in a leaf, to its open importers", lambda n: session.edit("m0", heads[n % 2], set(users)))
-        unseen = [renamed(leaf, f"k{n}") if n % 2 else changed for n in range(ROUNDS)]
-        show("the same, mended in a new way each time", lambda n: session.edit("m0", unseen[n], set(users)))
+        again = resigned(leaf, None)
+        show("signature in a leaf, to its open importers", lambda n: session.edit("m0", again[n % 2], set(users)))
+        unseen = [text for n in range(ROUNDS // 2) for text in resigned(leaf, n)]
+        show("the same, one that never was there before", lambda n: session.edit("m0", unseen[n], set(users)))
         print(f"front end: {front_end()}; load {os.getloadavg()[0]:.1f} of {os.cpu_count()} processors")
 
 

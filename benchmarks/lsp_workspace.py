@@ -1,13 +1,14 @@
 """A workspace like a large project of one's own: 200 modules, 42,000 lines, one module of 2,000.
 
-Owns `workspace`, without arrays and with them, and `written`. Definitions are of the size of those in the paper and in
-`examples/`: shaders, small integrals with a condition, helpers, documented; a module imports a few others that come
-before it, so that there are leaves, a middle and a top, and no cycles.
+Owns `workspace`, without arrays and with them, `resigned` and `written`. Definitions are of the size of those in the
+paper and in `examples/`: shaders, small integrals with a condition, helpers, documented; a module imports a few others
+that come before it, so that there are leaves, a middle and a top, and no cycles.
 """
 
 from __future__ import annotations
 
 import os
+import re
 import sys
 import tempfile
 from collections.abc import Iterator
@@ -129,6 +130,19 @@ def workspace(arrays: bool = False) -> dict[str, str]:
     rest = (LINES - LARGE) // (MODULES - 1)
     sizes = {n: LARGE if module_name(n) == "large" else rest for n in range(MODULES)}
     return {module_name(n): module_text(n, lines, arrays) for n, lines in sizes.items()}
+
+
+def resigned(leaf: str, number: int | None) -> tuple[str, str]:
+    """The leaf with signatures that do not fit its importers, as they fill a parameter that is not there any more, and
+    with some that do. With a number the parameters have names that they never had before."""
+    first, *others = re.split(r"(?m)^(?=def )", leaf)
+    t, k = ("t", "k") if number is None else (f"t{number}", f"k{number}")
+    fitting = first
+    for other in others:
+        if other.startswith(("def f0(", "def f1(")):
+            other = re.sub(r"\bk\b", k, re.sub(r"\bt\b", t, other))
+        fitting += other
+    return re.sub(rf"(?m)^(def f[01]\({t}), {k}\)", r"\1)", fitting), fitting
 
 
 @contextmanager
