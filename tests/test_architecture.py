@@ -44,6 +44,7 @@ OUTSIDERS: dict[str, tuple[str, ...]] = {
         "potto.python.arrays",
         "potto.python.forms",
         "potto.python.gradients",
+        "potto.python.sided",
         "potto.applications",
         "potto.bench",
         "potto.bridges",

@@ -19,7 +19,7 @@ from potto.python.arguments import batch_of
 from potto.python.functions import Function, bound, deriv
 from potto.python.gradients import Gradient, Names, grad, in_given_form, parameters_to_vary
 from potto.python.remade import remade
-from potto.runtime.answers.estimate import Estimate
+from potto.runtime.answers.estimate import Estimate, OneSided
 
 
 @remade
@@ -63,7 +63,7 @@ def hessian(function: Function, wrt: Names = None) -> Callable[..., Estimate]:
         single = len(names) == 1 and not isinstance(given[names[0]], tuple | Rows)
         sides = (product.tangent, product.tangent_error)
         value, error = (_as_matrix(list(_leaves(side, 1 + axes)), single) for side in sides)
-        common = {name: getattr(found, name) for name in Estimate.__struct_fields__}
+        common = {name: getattr(product, name) for name in Estimate.__struct_fields__}
         told = {"value": value, "error": error, "tangent": None, "tangent_error": None}
         members = np.all(found.member_converged, axis=0) if axes else None
         reasons = {why: np.any(where, axis=0) if axes else True for why, where in found.shortfalls.items()}
@@ -191,8 +191,26 @@ def _product(found: Gradient, given: Mapping[str, Any], names: tuple[str, ...]) 
 
     return replace(
         found, value=found.value[0], error=found.error[0], tangent=part(found.tangent),
-        tangent_error=part(found.tangent_error), wrt=names,
+        tangent_error=part(found.tangent_error), wrt=names, notes=_own_notes(found, [_count(given[n]) for n in names]),
     )  # fmt: skip
+
+
+def _own_notes(found: Gradient, counts: list[int]) -> tuple[OneSided, ...]:
+    """Of notes on (f, f' v) by each parameter and its tangent, what they say of f' v by the parameters of these sizes.
+
+    It may be one number to both sides: then there is nothing to note.
+    """
+    batch = np.shape(found.value[0])
+    own = np.concatenate([np.repeat([True, False], count) for count in counts])
+    notes = []
+    for note in found.notes:
+        sides = [np.asarray(side) for side in (note.backward, note.forward, note.backward_error, note.forward_error)]
+        if sides[0].size == 2 * own.size * np.prod(batch):  # else it is of one integral, by what that depends on
+            sides = [np.squeeze(side.reshape(2, own.size, *batch)[1][own]) for side in sides]
+        backward, forward, before, beyond = sides
+        if not np.array_equal(backward, forward) or not np.isfinite(backward).all():
+            notes.append(replace(note, backward=backward, forward=forward, backward_error=before, forward_error=beyond))
+    return tuple(notes)
 
 
 def _last(slopes: Any, argument: Any) -> Any:

@@ -1,8 +1,8 @@
 """Tangents that are written down instead of worked out: what a number depends on, and how steeply.
 
-Owns `Node`, `linear`, `swept` and `pushed`. A kernel that tapes carries one tangent, a node: the linear map from the
-numbers that it was made of. Swept from an answer back to the seeds, the tape gives the derivatives by all of them, at
-the cost of a few values whatever their number (reverse accumulation); pushed forward, it gives tangents.
+Owns `Node`, `linear`, `swept`, `pushed` and `reached`. A kernel that tapes carries one tangent, a node: the linear map
+from the numbers that it was made of. Swept from an answer back to the seeds, the tape gives the derivatives by all of
+them, at the cost of a few values whatever their number (reverse accumulation); pushed forward, it gives tangents.
 
 An edge keeps with its slope how far off that may be. To first order an error is then a sum over edges: the sensitivity
 of the answer, along all paths without regard to sign, times what the slope is off, times how far the seeds can have
@@ -281,6 +281,26 @@ def swept(answers: Sequence[tuple[Node, Any]]) -> dict[Node, Swept]:
                 _gather(sums, edge.parent, _along(edge, own, most))
             else:
                 _gather(sums, edge.parent, Sum(pull(own.value), pull(own.size), pull(own.error), own.whole))
+    return found
+
+
+def reached(nodes: Iterable[tuple[Node, Any]]) -> dict[Node, Any]:
+    """The seeds that these members of nodes are made of, and which members of them, however steeply."""
+    marks: dict[Node, Any] = {}
+    found: dict[Node, Any] = {}
+
+    def mark(node: Node, part: Any) -> None:
+        own = np.asarray(_fitted(np.asarray(part, dtype=float), node.shape)) > 0
+        marks[node] = own | marks[node] if node in marks else own
+
+    for node, members in nodes:
+        mark(node, members)
+    for node in reversed(_in_order(marks)):
+        own = marks.pop(node)
+        if not node.edges:
+            found[node] = own
+        for edge in node.edges:
+            mark(edge.parent, own if edge.pull is None else edge.pull(own.astype(float)))
     return found
 
 

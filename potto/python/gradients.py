@@ -28,17 +28,17 @@ from potto.python.forms import as_matrix, bounds_of, by_name, in_lists, must_mat
 from potto.python.functions import Function, bound, must_be_function
 from potto.python.moving import each_moving, moved, size, with_places
 from potto.python.remade import remade
+from potto.python.sided import with_sides
 from potto.runtime.answers.estimate import Estimate
 from potto.runtime.evaluate import Clock, bar, number, report, told
 from potto.runtime.evaluation.machine import Machine
+from potto.runtime.evaluation.record import Record
 from potto.runtime.evaluation.sides import as_a_whole
 
 # Parameters, from which on a tape is swept back instead of carrying a tangent for each: it costs 2.5 to 3.4 values
 # whatever their number, tangents 1.6 at 4 and, where all depends on all, 2.7 at 12 and 4.8 at 64; the first call costs
 # half as much from 8 on (`benchmarks/gradients.py ways`). What integrals carry is the same either way.
 MANY = 12
-# Up to how many are differentiated by again, forward, where parts have two derivatives: a tape tells those of parts.
-SIDES = 32
 NOTHING: Swept = (None, None)
 Names = Sequence[str] | str | None
 
@@ -308,14 +308,22 @@ class _Run:
             self.whole = True
             try:
                 found = self.evaluated(moving, self.machine.taped(), lambda value: swept_back(value, seeds))
-                if directions > SIDES or not self.machine.record.edges:
-                    return found
+                return found if not self.machine.record.edges else self._with_sides(found, wrt, seeds, forward)
             except Untaped:
                 pass
             self.machine, self.whole = self._machine(), False
         numbers = iter(range(directions))
         moving = {name: each_moving(self.given[name], numbers, directions) for name in wrt}
         return self.evaluated(moving, self.machine.with_directions(directions), forward)
+
+    def _with_sides(
+        self, found: Value, wrt: tuple[str, ...], seeds: Sequence[Node], forward: Callable[[Value], Value]
+    ) -> Value:
+        def run(moving: dict[str, Value], directions: int) -> tuple[Value, Record]:
+            machine = self._machine().with_directions(directions)
+            return self.evaluated(moving, machine, forward), machine.record
+
+        return with_sides(found, self.machine.record, {name: self.given[name] for name in wrt}, seeds, run)
 
     def evaluated(self, moving: Mapping[str, Value], machine: Machine, ended: Callable[[Value], Value]) -> Value:
         """What `ended` makes of the value that this machine finds where these parameters move."""

@@ -14,6 +14,7 @@ from potto.core.terms import Branch, Prim, Term, function_of, prim, var
 from potto.integrate.events import OneSidedDerivatives, TwoSided
 from potto.kernels.cells import Array, Bools, Cell
 from potto.kernels.kinks import places
+from potto.kernels.tape import Node
 from potto.primitives import PRIMITIVES
 from potto.runtime.evaluation.machine import Machine
 
@@ -29,17 +30,21 @@ def note_kink(
     number = next((i for i, there in enumerate(near) if np.any(there)), None)
     if number is None or machine.frozen:
         return
+    if machine.taping:
+        here = np.any(near, axis=0)
+        nodes: list[Any] = [arg.t[0] for arg in args if arg.t]
+        machine.record.taped += [(node, here) for node in nodes if isinstance(node, Node)]
     if isinstance(term, Branch) or PRIMITIVES[term.op].steps(*term.args):
         surface = term.surface if isinstance(term, Branch) else places(term)[number]
         return _note_jump(machine, surface, np.any(near, axis=0), args)
     cause = TwoSided("", places(term)[number], kink=True)
-    if any(edge.cause == cause for edge in machine.record.edges):
+    if machine.record.again(cause):
         return
     (backward, before), (forward, beyond) = (_on_side(machine, term, args, side) for side in (-1, 1))
     differ = np.any(near, axis=0) & (backward != forward) & ~(np.isnan(backward) & np.isnan(forward))
     if differ.any():
         sides = (np.where(differ.any(axis=0), side, np.nan) for side in (backward, forward, before, beyond))
-        machine.record.edges.append(OneSidedDerivatives(cause, *sides))
+        machine.record.meet(OneSidedDerivatives(cause, *sides))
 
 
 def _note_jump(machine: Machine, surface: Term, near: Bools, args: tuple[Cell, ...]) -> None:
@@ -49,9 +54,9 @@ def _note_jump(machine: Machine, surface: Term, near: Bools, args: tuple[Cell, .
     moves = np.array([near & (tapes | np.any([np.broadcast_to(x != 0, near.shape) for x in row], axis=0))
                       if row else np.zeros_like(near) for row in rows])  # fmt: skip
     cause = TwoSided("", surface)
-    if moves.any() and not any(edge.cause == cause for edge in machine.record.edges):
+    if moves.any() and not machine.record.again(cause):
         unknown = np.where(moves, np.nan, 0.0)
-        machine.record.edges.append(OneSidedDerivatives(cause, unknown, unknown, unknown, unknown))
+        machine.record.meet(OneSidedDerivatives(cause, unknown, unknown, unknown, unknown))
 
 
 def _on_side(machine: Machine, term: Prim, args: tuple[Cell, ...], side: int) -> tuple[Array, Array]:

@@ -124,6 +124,7 @@ class _Steps:
 
     def ended(self) -> Value:
         machine, k = self.machine, 0 if self.machine.taping else self.machine.directions
+        met = machine.record.met
         begun = self.rows(all_cells(self.start), "e")[0]
         values = self.linearized(None)
         bounds = spread(values.by_state, values.off, begun)
@@ -131,7 +132,7 @@ class _Steps:
             return self.made(bounds[-1], [], [])
         slopes = self.linearized(bounds[:-1])
         if machine.taping:
-            return self.taped(bounds[-1], values, slopes)
+            return self.taped(bounds[-1], values, slopes, met)
         first = np.stack([self.rows(all_cells(self.start), "t", d)[0] for d in range(k)], axis=-1)
         begun = np.stack([self.rows(all_cells(self.start), "et", d)[0] for d in range(k)], axis=-1)
         t = carried(values.by_state, values.by_rest, first)
@@ -160,6 +161,7 @@ class _Steps:
         here[self.term.state] = self.state(off, k, total)
         with looked_through():
             value = _called(machine, self.body, here)
+        self.machine.record.met = max(self.machine.record.met, record.met)
         cells = all_cells(value)
         local = self.rows(cells, "e", many=True)[0]
         t = [self.rows(cells, "t", d, many=True) for d in range(total)]
@@ -219,8 +221,9 @@ class _Steps:
 
     # On a tape
 
-    def taped(self, e: Array, values: _Linear, slopes: _Linear) -> Value:
-        """The last state, as what the steps took from elsewhere times what the steps after them made of it."""
+    def taped(self, e: Array, values: _Linear, slopes: _Linear, met: int) -> Value:
+        """The last state, as what the steps took from elsewhere times what the steps after them made of it. met: how
+        often something with two derivatives was met before them: what states move with may be any of all that."""
         here = {name: pad(value, 1) for name, value in self.env.items()}
         here[self.term.variable] = Cell(self.place, None, (None,))
         here[self.term.state] = _with_cells(self.start, iter([Cell(met, None, (None,)) for met in self.met]))
@@ -232,6 +235,8 @@ class _Steps:
         zero = np.zeros((*self.shape, self.d, self.d))
         off = spread(back[..., None, :, :], sizes[::-1], zero)[::-1]
         nodes = self._numbers(taken, self.count), self._numbers(self.start, None)
+        if self.machine.record.met > met:
+            self.machine.record.taped += [(x, True) for own in nodes for x in own if isinstance(x, Node)]
         ends = []
         for c in range(self.d):
             edges = [(whole[1:, ..., c, i], node, off[1:, ..., c, i]) for i, node in enumerate(nodes[0])]

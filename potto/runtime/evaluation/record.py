@@ -18,6 +18,7 @@ from potto.integrate import costs
 from potto.integrate.costs import Costs
 from potto.integrate.events import Events, OneSidedDerivatives, Shortfall, TwoSided
 from potto.kernels.cells import Array, Value
+from potto.kernels.tape import Node
 from potto.runtime.answers.convergence import Shortfalls, merged
 
 
@@ -109,6 +110,8 @@ class Record(Struct):
 
     shortfalls, edges: why answers are not what was asked for, and where they are one-sided, as masks and numbers over
     the whole of what was asked for, or True and numbers for one.
+    met: how often something was met that has two derivatives; taped: what it moves with on a tape, if there is one, as
+    nodes and the members of these.
     within: the error up to which what cancels is 0 as accurately as asked for, of all or of each of the batch.
     culled: integrals that are 0 for certain, and were not evaluated.
     start, members: how many evaluations had been done before those that count, and for how many members these are.
@@ -119,6 +122,8 @@ class Record(Struct):
     depth: int = 0
     shortfalls: Shortfalls = {}
     edges: list[OneSidedDerivatives] = []
+    met: int = 0
+    taped: list[tuple[Node, Any]] = []
     methods: set[str] = set()
     second: bool = False
     within: Any = 0.0
@@ -136,6 +141,17 @@ class Record(Struct):
     def spent(self) -> float:
         """The evaluations that count, of one member."""
         return (self.evaluations - self.start) / self.members
+
+    def meet(self, edge: OneSidedDerivatives) -> None:
+        """Note something that has two derivatives."""
+        self.met += 1
+        self.edges.append(edge)
+
+    def again(self, cause: TwoSided) -> bool:
+        """Whether this was met before, and what it says is noted: it is met once more."""
+        known = any(edge.cause == cause for edge in self.edges)
+        self.met += known
+        return known
 
     def tell(self, events: Events, batch: int, shape: tuple[int, ...]) -> None:
         """Add what the integrals of a whole batch have met to what the answer says, in the batch's shape."""
@@ -156,7 +172,7 @@ class Record(Struct):
                 if known.shape[0] == rows.shape[0]:
                     known[:, slice(None) if members is None else members] = rows
         for cause, found in edges.items():
-            self.edges.append(OneSidedDerivatives(cause, *(side.reshape(-1, *shape) for side in found)))
+            self.meet(OneSidedDerivatives(cause, *(side.reshape(-1, *shape) for side in found)))
 
     @contextmanager
     def among(self, members: int) -> Iterator[None]:

@@ -156,11 +156,11 @@ def _at(parts: tuple[Number | None, ...], direction: int) -> Any:
 
 def _note(machine: Machine, ties: _Ties, cause: TwoSided) -> None:
     """Tell both derivatives."""
-    if any(edge.cause == cause for edge in machine.record.edges):
+    if machine.record.again(cause):
         return
     where = ties.differ.any(axis=0)
     sides = (np.where(where, side, np.nan) for side in (ties.backward, ties.forward, ties.before, ties.beyond))
-    machine.record.edges.append(OneSidedDerivatives(cause, *sides))
+    machine.record.meet(OneSidedDerivatives(cause, *sides))
 
 
 _REDUCTIONS: dict[str, Callable[[Array], Array]] = {

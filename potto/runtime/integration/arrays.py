@@ -1,6 +1,6 @@
 """Arrays end where an integral begins: what it reads of them is found beside it, and it integrates numbers.
 
-Owns `without_arrays` and `in_numbers`.
+Owns `without_arrays`, `in_numbers` and `as_written`.
 """
 
 from __future__ import annotations
@@ -8,14 +8,16 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
+from msgspec.structs import replace
 
 from potto.calculus.differentiation.derivative import NotSmooth
 from potto.calculus.inlining.arrays import MOST_STEPS, TooMany, each_integral, inlined, loops, summands, unrolled
 from potto.calculus.inlining.lattices import by_cells
 from potto.calculus.inlining.reads import Access, hoisted
 from potto.calculus.solving.pivots import NoClosedForm
-from potto.core.terms import Index, Integral, Term, function_of, substitute, tuple_, var
+from potto.core.terms import Index, Integral, Term, function_of, proj, substitute, tuple_, var
 from potto.diagnostics import PottoError, declare
+from potto.integrate.events import OneSidedDerivatives
 from potto.kernels import errors
 from potto.kernels.cells import Cell, Number, Value
 from potto.kernels.making import making
@@ -27,6 +29,7 @@ from potto.runtime.integration.uncounted import not_found
 TOO_LONG = declare("P0515", "a loop under an integral is too long to be written out")
 
 Env = dict[str, Value]
+Read = dict[str, Term]
 
 
 def met(term: Integral, env: Env, reach: Reach) -> bool:
@@ -41,14 +44,15 @@ def holds(value: Value) -> bool:
     return not isinstance(value, Cell | Closure)
 
 
-def without_arrays(machine: Machine, term: Integral, env: Env) -> tuple[Term, Env]:
-    """An equal term, and what it is of: an integral of numbers; or a term in which sums are around integrals."""
+def without_arrays(machine: Machine, term: Integral, env: Env) -> tuple[Term, Env, Read]:
+    """An equal term, what it is of, and what its new names stand for: an integral of numbers; or a term in which sums
+    are around integrals."""
     reach = machine.linker.reach
     names = frozenset(name for name in term.free if holds(env[name]))
     with making:
         found = _outside(term, names, reach)
     if not isinstance(found, Integral):
-        return found, {name: env[name] for name in found.free}
+        return found, {name: env[name] for name in found.free}, {}
     term = found
     while ends := loops(term):
         known = tuple((end, _whole(machine, end, env)) for end in ends)
@@ -97,18 +101,37 @@ class Differ(Exception):
         self.ends = np.asarray(ends)
 
 
-def _read(machine: Machine, term: Integral, accesses: tuple[Access, ...], env: Env) -> tuple[Term, Env]:
+def as_written(edges: list[OneSidedDerivatives], known: int, read: Read) -> None:
+    """In what was met beyond what is known, put what names stand for: the program has no others."""
+    for place in range(known, len(edges) if read else 0):
+        cause = edges[place].cause
+        surface, other = (None if x is None else substitute(x, read) for x in (cause.surface, cause.other))
+        edges[place] = replace(edges[place], cause=replace(cause, surface=surface, other=other))
+
+
+def _read(machine: Machine, term: Integral, accesses: tuple[Access, ...], env: Env) -> tuple[Term, Env, Read]:
     """The integral, with the values of what it reads; tuples in their parts."""
+    read: Read = {}
     here = {name: env[name] for name in term.free if name in env}
     parts: dict[str, Term] = {}
     for access in accesses:
         value = machine.evaluate(function_of(access.term), {name: env[name] for name in access.term.free}, None)
         if isinstance(value, tuple):
             parts[access.name] = in_names(access.name, value, here)
+            read |= _parts_of(access.term, access.name, value)
         else:
             here[access.name] = value
+            read[access.name] = access.term
     found = substitute(term, parts) if parts else term
-    return found, {name: here[name] for name in found.free}
+    return found, {name: here[name] for name in found.free}, read
+
+
+def _parts_of(term: Term, name: str, value: Value) -> Read:
+    """What the names of the parts of a tuple stand for."""
+    if not isinstance(value, tuple):
+        return {name: term}
+    each = (_parts_of(proj(term, place), f"{name}.{place}", item) for place, item in enumerate(value))
+    return {part: own for parts in each for part, own in parts.items()}
 
 
 def in_numbers(term: Integral, env: Env) -> tuple[Integral, Env]:

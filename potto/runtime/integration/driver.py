@@ -27,7 +27,7 @@ from potto.runtime.evaluation.functions import Chosen, choices, settled
 from potto.runtime.evaluation.local import locally
 from potto.runtime.evaluation.machine import Machine
 from potto.runtime.evaluation.selection import Pick, apart
-from potto.runtime.integration.arrays import Differ, in_numbers, met, without_arrays
+from potto.runtime.integration.arrays import Differ, Read, as_written, in_numbers, met, without_arrays
 from potto.runtime.integration.members import Whole
 from potto.runtime.integration.preparation import filled, held, placed, prepared
 from potto.runtime.integration.problem import Mixed, Problem, linked
@@ -40,11 +40,11 @@ from potto.runtime.integration.taken_apart import together
 def integral(machine: Machine, term: Integral, env: dict[str, Value]) -> Value:
     """The value of an integral in an environment whose numbers may be batches of any shape: what it reads of arrays is
     found beside it, and it is solved in as few directions as there have to be."""
-    linker = machine.linker
+    linker, read = machine.linker, Read()
     term, env = filled(term, env, linker.reach)
     if met(term, env, linker.reach):
         try:
-            ready, env = without_arrays(machine, term, env)
+            ready, env, read = without_arrays(machine, term, env)
         except Differ as differ:
             return _by_length(machine, term, env, differ.ends)
         if not isinstance(ready, Integral):
@@ -54,7 +54,10 @@ def integral(machine: Machine, term: Integral, env: dict[str, Value]) -> Value:
     if different is not None:
         return _by_choice(machine, term, env, different)
     term, env = in_numbers(term, env)
-    return locally(machine, env, lambda own, here: _of_numbers(own, term, here))
+    known = len(machine.record.edges)
+    value = locally(machine, env, lambda own, here: _of_numbers(own, term, here))
+    as_written(machine.record.edges, known, read)
+    return value
 
 
 def _of_numbers(machine: Machine, term: Integral, env: dict[str, Value]) -> Value:

@@ -52,7 +52,7 @@ def note_rims(machine: Machine, term: Integral, env: dict[str, Value]) -> None:
             backward, forward = (np.atleast_1d(_number(machine, side, env)) for side in sides)
             if not np.array_equal(backward, forward):
                 off = np.zeros_like(forward)
-                machine.record.edges.append(OneSidedDerivatives(cause, backward, forward, off, off))
+                machine.record.meet(OneSidedDerivatives(cause, backward, forward, off, off))
 
 
 def _number(machine: Machine, term: Term, env: dict[str, Value]) -> float | Array:
