@@ -10,6 +10,7 @@ executor loses (a process that was killed, a machine that is gone) is evaluated 
 
 from __future__ import annotations
 
+import math
 import os
 import time
 from collections.abc import Callable, Iterator
@@ -37,9 +38,12 @@ if TYPE_CHECKING:
 LEAST = 2048  # members, from which on a batch has blocks: below, the calls for some would cost as much as all
 # Members of a block: as many as take ENOUGH seconds at least, tried from PILOT on; after less than LITTLE with 64 times
 # as many, else with twice as many. What is cut in a block costs a few milliseconds whatever there is of it: 16 blocks
-# of what takes 20 ms in one would take 80. Longer blocks could not be shared evenly.
+# of what takes 20 ms in one would take 80. Longer blocks could not be shared evenly; but where a block costs far more
+# than its members (64 pixels whose edges are searched 0.14 s, 1,024 of them 0.4), they are four times as large each
+# time, as long as a member of them costs less than FALLS of what one cost before, and they take less than LONG.
 PILOT, MOST = 1 << 6, 1 << 18
-ENOUGH, LITTLE = 0.1, 0.005
+ENOUGH, LITTLE, LONG = 0.1, 0.005, 1.0
+FALLS = 0.6
 COLD = 2.0  # seconds, less than which the first run may only have been slow because it was the first
 TILE = 0.5  # seconds of a tile by the clock, at the most
 SHARES = 4  # tiles a worker gets at least, where there are enough blocks: who is done first takes more
@@ -163,16 +167,18 @@ class _Tiles(Struct):
     def _size(self) -> int:
         """The size of blocks, by trying where it is not known; one that was taken is done."""
         size, most = _sizes.get(self.key, (PILOT, False))
-        tried = size
+        tried, each = size, math.inf
         while not most and 2 * size <= self.count and size < MOST:
             self._alone((0, size))
-            if ENOUGH <= self.spent < COLD:
+            if ENOUGH <= self.spent < COLD and each == math.inf:
                 self._put_aside()
                 self._alone((0, size))
-            most = self.spent >= ENOUGH
+            fallen, each = self.spent < FALLS * each * size, self.spent / size
+            most = self.spent >= (LONG if fallen else ENOUGH)
             if most:
                 break
-            tried, size = size, min(size * (64 if self.spent < LITTLE else 2), MOST)
+            tried = size
+            size = min(size * (64 if self.spent < LITTLE else 2 if self.spent < ENOUGH else 4), MOST)
             self._put_aside()
         if not most and self.spent:  # twice as many take less than twice ENOUGH, and so may all
             while size < self.count and size < MOST and self.spent * self.count <= 2 * ENOUGH * tried:

@@ -58,6 +58,7 @@ def small_blocks(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """Blocks of 64 members, tiles of a few blocks, and helpers at once, that no test takes long; by numpy alone, as
     machine code, which takes over at some time, adds up in another order."""
     monkeypatch.setattr(tiles, "ENOUGH", 0.0)
+    monkeypatch.setattr(tiles, "LONG", 0.0)
     monkeypatch.setattr(tiles, "WORTH", -1.0)
     monkeypatch.setattr(Workers, "worth", -1.0)
     monkeypatch.setattr(tiles, "_sizes", {})
@@ -179,8 +180,24 @@ def test_tuples_and_the_least_batches(module: Any) -> None:
 def test_a_large_batch_is_not_held_to_the_blocks_of_a_small_one(module: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     """Where nothing takes long, a batch is one block, whatever was asked before."""
     monkeypatch.setattr(tiles, "ENOUGH", 1e9)
+    monkeypatch.setattr(tiles, "LONG", 1e9)
     monkeypatch.setattr(tiles, "LITTLE", 0.0)
     assert [module.pair(np.linspace(0, 1, count)).stats["blocks"] for count in (2100, 9000, 2100)] == [1, 1, 1]
+
+
+@pytest.mark.parametrize(("block", "member", "size"), [(0.13, 0.00025, 4096), (0.0, 0.002, 256), (0.0, 0.05, 64)])
+def test_blocks_are_large_where_a_block_costs_more_than_its_members(
+    monkeypatch: pytest.MonkeyPatch, block: float, member: float, size: int
+) -> None:
+    """By a clock that says so: 0.13 s a block are a fifth of what 4,096 members take, and half of what 1,024 do."""
+    for name, seconds in (("ENOUGH", 0.1), ("LONG", 1.0)):
+        monkeypatch.setattr(tiles, name, seconds)
+
+    def alone(self: Any, part: tuple[int, int]) -> None:
+        self.spent = block + member * (part[1] - part[0])
+
+    monkeypatch.setattr(tiles._Tiles, "_alone", alone)
+    assert tiles._Tiles(25600, lambda part: None, lambda parts: None, "key")._size() == size  # type: ignore[arg-type, return-value]
 
 
 def test_what_is_made_while_the_size_of_blocks_is_tried_is_told() -> None:

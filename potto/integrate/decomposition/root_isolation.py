@@ -11,7 +11,8 @@ import numpy as np
 from msgspec import Struct
 
 from potto.core.terms import Branch, Proj, Term, Var, children, postorder, rebuild, var
-from potto.integrate.rules.intervals import Interval, enclosure, everywhere
+from potto.integrate.rules.intervals import Interval, everywhere
+from potto.integrate.rules.lowered_intervals import enclosures
 from potto.kernels.cells import Array, Bools, Cell, Ints, Value
 
 FINEST = 48  # halvings of the whole
@@ -39,8 +40,9 @@ class Brackets(Struct):
 
 
 def isolated(
-    surface: Term, slope: Term, variable: str, env: dict[str, Value], low: Array, high: Array, jumps: bool = True
-) -> Brackets:
+    surface: Term, slope: Term, variable: str, env: dict[str, Value], low: Array, high: Array, jumps: bool = True,
+    backend: str = "numpy",
+) -> Brackets:  # fmt: skip
     """The sign changes of a surface between bounds (B,), which may be infinite.
 
     jumps: whether something jumps there, so that what hides roots is left as it is; a kink is wanted to the last digit.
@@ -51,7 +53,7 @@ def isolated(
         value = env[name]
         assert isinstance(value, Cell)
         fixed[name] = value.v, value.v
-    cells = _Cells(surface, slope, variable, fixed, low, high)
+    cells = _Cells(surface, slope, variable, fixed, low, high, backend)
     there = np.nonzero(low < high)[0]
     owner, s0, s1 = there, np.zeros(there.size), np.ones(there.size)
     found: list[_Stretches] = []
@@ -153,6 +155,7 @@ class _Cells(Struct, dict=True):
     fixed: dict[str, Interval]
     low: Array
     high: Array
+    backend: str
 
     def __post_init__(self) -> None:
         self.total = everywhere(self.surface)
@@ -196,7 +199,8 @@ class _Cells(Struct, dict=True):
         return index, crossed, np.nonzero(~free & ~settled & ~shallow)[0], np.nonzero(shallow)[0]
 
     def enclosed(self, terms: tuple[Term, ...], box: dict[str, Interval], shape: tuple[int, ...]) -> list[Interval]:
-        return [(np.broadcast_to(lo, shape), np.broadcast_to(hi, shape)) for lo, hi in enclosure(terms, box)]
+        found = enclosures(terms, box, *shape, self.backend)
+        return [(np.broadcast_to(lo, shape), np.broadcast_to(hi, shape)) for lo, hi in found]
 
     def at_points(self, owner: Ints, places: tuple[Array, ...]) -> list[Interval]:
         """The surface at several places of each cell, all by one enclosure: most batches are small."""

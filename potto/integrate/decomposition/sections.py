@@ -131,7 +131,9 @@ class _Along(Struct, frozen=True, dict=True):
         if slope is None:
             a, b = in_rows(*self.on_a_grid(low, high), batch)
         else:
-            brackets = isolated(self.surface, slope, self.variable, self.env, low, high, self.decides)
+            brackets = isolated(
+                self.surface, slope, self.variable, self.env, low, high, self.decides, self.machine.backend
+            )
             most = brackets.owner.size if self.decides else MOST_KINKS * batch
             if self.decides and not brackets.complete:
                 self.machine.note(ROOTS_NOT_SEPARATED)

@@ -19,7 +19,7 @@ from potto.integrate.fixed.rule_text import RuleText
 from potto.integrate.fixed.straight import Straight
 from potto.integrate.pieces import Evaluator
 from potto.integrate.rules.gauss import EPS, gauss
-from potto.integrate.rules.lowered_intervals import Written
+from potto.integrate.rules.written_intervals import Names, Written
 from potto.kernels.native.straight import NotStraight
 
 # How near to 0, of its size, a surface at a corner may be before it counts as crossing.
@@ -112,9 +112,10 @@ class BoxText(RuleText):
         for least, most in self.corners(here):
             near = at.apply("mul", at.number(NEAR), self.larger(least, most))
             sides.append((at.apply("gt", least, near), at.apply("lt", most, at.apply("neg", near))))
-        for least, most in self.enclosed(here):
+        for least, most, nowhere, _ in self.enclosed(here):
             sides.append((at.apply("gt", least, self.zero), at.apply("lt", most, self.zero)))
             known.append(at.apply("lt", self.larger(least, most), at.number(float("inf"))))
+            known += [] if nowhere is None else [at.apply("not", nowhere)]
         clear += [at.apply("or", above, below) for above, below in sides]
         decided = self.all(clear)
         lit = [self.among(decided, sides, codes) for _, codes in look.faces]
@@ -138,10 +139,10 @@ class BoxText(RuleText):
                      for (least, most), cell in zip(pairs, cells, strict=True)]  # fmt: skip
         return found
 
-    def enclosed(self, here: Mapping[str, Symbol]) -> list[tuple[str, str]]:
+    def enclosed(self, here: Mapping[str, Symbol]) -> list[Names]:
         """Bounds of the other surfaces."""
-        box = {name: (symbol.v, symbol.v) for name, symbol in here.items()}
-        box |= dict(zip(self.plan.variables, zip(self.low, self.high, strict=True), strict=True))
+        box = {name: Names(symbol.v, symbol.v) for name, symbol in here.items()}
+        box |= dict(zip(self.plan.variables, map(Names, self.low, self.high), strict=True))
         return Written(self.at).walk(self.look.curved, box, {}) if self.look.curved else []
 
     def among(self, decided: str, sides: Sequence[tuple[str, str]], codes: Sequence[int]) -> str:

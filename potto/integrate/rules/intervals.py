@@ -112,17 +112,19 @@ INTERVALS = _Intervals()
 
 @lru_cache(maxsize=256)
 def _rule(op: str) -> Callable[..., Interval] | None:
-    entry = PRIMITIVES[op]
-    if entry.interval is None and not entry.piecewise_monotone:
-        return None
-    return lambda *args: _by_entry(entry, args)
+    found = interval_of(PRIMITIVES[op])
+    return None if found is None else lambda *args: _by_entry(PRIMITIVES[op], found, args)
 
 
-def _by_entry(entry: Primitive, args: tuple[Interval, ...]) -> Interval:
-    if entry.interval is not None:
-        result = entry.interval(OPS, *args)
-    else:
-        result = between_turns(OPS, entry.name, entry.within, entry.turns or (), args[0])
+def interval_of(entry: Primitive) -> Callable[..., tuple[Any, ...]] | None:
+    """The bounds of a builtin's values before they are rounded, by an arithmetic and the bounds of its arguments."""
+    if entry.interval is not None or not entry.piecewise_monotone:
+        return entry.interval
+    return lambda ops, a: between_turns(ops, entry.name, entry.within, entry.turns or (), a)
+
+
+def _by_entry(entry: Primitive, bounds: Callable[..., tuple[Any, ...]], args: tuple[Interval, ...]) -> Interval:
+    result = bounds(OPS, *args)
     room: Any = ROUNDING
     if entry.ulp != 1:
         lower, upper = (entry.places(*ends) for ends in zip(*args, strict=True))
