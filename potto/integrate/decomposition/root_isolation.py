@@ -199,7 +199,7 @@ class _Cells(Struct, dict=True):
         return index, crossed, np.nonzero(~free & ~settled & ~shallow)[0], np.nonzero(shallow)[0]
 
     def enclosed(self, terms: tuple[Term, ...], box: dict[str, Interval], shape: tuple[int, ...]) -> list[Interval]:
-        found = enclosures(terms, box, *shape, self.backend)
+        found = enclosures(terms, box, shape[0], self.backend)
         return [(np.broadcast_to(lo, shape), np.broadcast_to(hi, shape)) for lo, hi in found]
 
     def at_points(self, owner: Ints, places: tuple[Array, ...]) -> list[Interval]:
