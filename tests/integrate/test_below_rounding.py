@@ -82,3 +82,16 @@ def test_what_a_line_cuts_off_a_pixel(at: float, beyond: float, converged: bool,
         exact = mp.mpf(scale) * max(mp.mpf(level) - 2 * mp.mpf(at), 0) ** 2 / 2
         assert abs(found.value - exact) <= found.error
     assert found.converged == converged, found.summary()
+
+
+def test_the_rounding_of_a_density_beside_a_turning_place_counts() -> None:
+    """lgamma(500) is 2,604, so that the density of beta(200, 300) has 13 digits; at x = 0 it ends like x^199.
+
+    The chance of less than 0.4 by the regularized incomplete beta function at 40 digits.
+    """
+    f = potto.compile("def f(a, b, t) integral (x ~ beta(a, b)) [x < t] d(x)").f
+    with mp.workdps(40):
+        exact = mp.betainc(200, 300, 0, mp.mpf(0.4), regularized=True)
+    for moving in (["t"], ["a", "t"], ["a", "b", "t"]):
+        found = potto.grad(f, wrt=moving)(200.0, 300.0, 0.4)
+        assert abs(found.value - exact) <= found.error <= 1e-11

@@ -45,6 +45,25 @@ def test_the_formula_of_the_first_derivative(name: str, dt: float, ds: float) ->
     assert abs(twice.tangent[1] - slope) <= 1e-7 * max(1, abs(slope)) + twice.tangent_error[1]
 
 
+def test_integrals_of_integrals_and_one_over_both() -> None:
+    """A disc of radius sqrt(t) under 1 + x*y + y^2: pi*t + pi*t^2/4. By the inner integral alone the formula of the
+    first derivative has an end like 1/sqrt, and lost half of the digits."""
+    m = potto.compile("""
+def nested(t) integral [-1, 1] (integral [-1, 1] [x^2 + y^2 < t]*(1 + x*y + y^2) d(y)) d(x)
+def joined(t) integral ([-1, 1], [-1, 1]) [x^2 + y^2 < t]*(1 + x*y + y^2) d(x, y)
+""")
+    nested, joined = (potto.hessian(f)(0.7) for f in (m.nested, m.joined))
+    assert abs(nested.value - math.pi / 2) <= nested.error <= 1e-10
+    assert nested.value == joined.value and nested.evals == joined.evals
+
+
+def test_the_greatest_of_six() -> None:
+    """All of six numbers are below t: t^6."""
+    f = potto.compile(f"def f(t) integral ({'[0, 1], ' * 5}[0, 1]) [max(a, b, c, u, v, w) < t] d(a, b, c, u, v, w)").f
+    found = potto.hessian(f)(0.7)
+    assert abs(found.value - 30 * 0.7**4) <= found.error <= 1e-11
+
+
 def test_a_jump_of_an_inner_integral_moves() -> None:
     """Where y is 0.5 the inner integral jumps, by 0.5 or by 1."""
     m = potto.compile("""

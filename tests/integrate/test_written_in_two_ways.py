@@ -35,6 +35,10 @@ PAIRS: list[tuple[str, str, str, str, tuple[float, float] | None]] = [
     ("discs joined", DISCS, f"[min({ONE}, {OTHER}) < 0]", f"[{ONE} < 0 or {OTHER} < 0]", None),
 ]  # fmt: skip
 
+SIDES = [f"{math.cos(0.1 + k * math.pi / 6)}*x + {math.sin(0.1 + k * math.pi / 6)}*y" for k in range(12)]
+PAIRS += [("max of twelve", DISCS, f"[max({', '.join(SIDES)}) < t]", "*".join(f"[{side} < t]" for side in SIDES),
+           (12 * math.tan(math.pi / 12) * T**2, 24 * math.tan(math.pi / 12) * T))]  # fmt: skip
+
 OTHERWISE = ("min", "abs that is larger", "clamp that is flat", "discs joined")  # one surface, and not two or none
 
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
+from potto.calculus.decomposition.joined import joined
 from potto.calculus.differentiation import loops
 from potto.calculus.differentiation.between import scaled
 from potto.calculus.differentiation.boundary_terms import at_bounds, at_surfaces, jumps
@@ -380,7 +381,7 @@ class _Pass:
         return _Pass(self.owner, {**still, **more}).run(body)
 
     def integral(self, node: Integral) -> Dual:
-        whole = resolved(loops.stepped(self.owner.carried_out(node)))
+        whole = resolved(loops.stepped(self.owner.carried_out(joined(node, self.owner.resolve))))
         if isinstance(whole, Integral) and isinstance(whole.body, Array | ListOf):
             whole = loops.of_integrals(whole)
         if not isinstance(whole, Integral):

@@ -37,7 +37,7 @@ MOST = 8  # cases that one condition is taken apart into
 
 def cased(term: Integral) -> Integral:
     """An equal integral, or the same one where there is nothing to take apart."""
-    return _changed(term, lambda node: _apart(node, MOST) if _changes(node) else node)
+    return _changed(term, lambda node: _settled(node, MOST) if _changes(node) else node)
 
 
 def by_extremes(term: Integral) -> Integral:
@@ -118,16 +118,19 @@ def _settled(node: Term, most: int) -> Term:
         written = PRIMITIVES[part.op].extremes
         extreme = part if written is None else written(*part.args)
         rises = _direction(surface, part) if part.op in _EXTREME else 0
-        if rises and isinstance(extreme, Prim) and extreme.op in ("max", "min") and len(extreme.args) <= most:
+        if rises and isinstance(extreme, Prim) and extreme.op in ("max", "min"):
             every = (extreme.op == "max") == (rises < 0)
             # Of an `or` the one surface with a kink takes less than two, unless one of the two is a number.
             if every or not all(arg.free for arg in extreme.args):
-                return _one_by_one(node, part, extreme.args, every, most // len(extreme.args))
+                return _one_by_one(node, part, extreme.args, every, most)
     return _apart(node, most) if _changes(node) else node
 
 
 def _one_by_one(node: Branch, part: Term, args: Sequence[Term], every: bool, most: int) -> Term:
-    """A condition with each of some terms in the place of a part: all of them hold, or one."""
+    """A condition with each of some terms in the place of a part: all of them hold, or one.
+
+    most: cases of each, as these conditions add up, where cases multiply.
+    """
     found = node.then if every else node.orelse
     for arg in reversed(args):
         yes, no = (found, node.orelse) if every else (node.then, found)

@@ -54,7 +54,7 @@ def noise(ends: Ends, width: int, p: Pieces, seg: Segments) -> Array:
     shares = [np.divide(e, np.abs(f), out=np.full(f.shape, np.inf), where=(f != 0) & np.isfinite(f)) for f, e in here]
     share = np.minimum(*shares)
     share = np.where((share > 4 * EPS) & (share < 1), share, 0.0)
-    share = np.where(seg.kind == substitution.LINEAR, share, 0.0)  # at a turning point little is left to be rounded
+    share = np.where(seg.kind == substitution.BOTH, 0.0, share)  # at a turning point little is left to be rounded
     sizes = p.size.reshape(width, -1, p.u0.size)
     return np.asarray((share[:, None] * sizes).reshape(p.size.shape))
 
