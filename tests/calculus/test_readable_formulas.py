@@ -5,8 +5,11 @@ from __future__ import annotations
 import pytest
 
 from potto.calculus.explanation.explain import explain_derivative
+from potto.calculus.explanation.readable import readable
 from potto.checking.facts import derivative_facts
 from potto.checking.library import Library
+from potto.core.printer import format_term
+from potto.core.terms import add, mul, prim, sub, var
 from potto.syntax import parse_expression
 
 PROGRAMS = [
@@ -78,6 +81,26 @@ def test_what_has_two_bounds_stands_between_them(condition: str, read: str) -> N
     library = Library()
     file = library.put("<text>", f"def f(t) integral ([0, 1], [0, 1]) [{condition}] d(x, y)\n")
     assert read in explain_derivative(library.db, file, "f").tangent
+
+
+@pytest.mark.parametrize(
+    ("program", "read"),
+    [
+        ("def f(t) integral ([0, 1], [0, 1]) [x*y < t] d(x, y)", "dt/x*[t > 0 and t < x]"),
+        ("def f(t) integral [0, 1] (integral [0, x] [y < t*x]*y d(y)) d(x)", "t*x^2*dt*[t > 0 and t < 1]"),
+        ("def f(t) integral [-1, 0] (integral [x, 0] [y < t*x] d(y)) d(x)", "x*dt*[t < 1 and t > 0]"),
+    ],
+)
+def test_factors_whose_sign_is_known_inside_an_integral_are_left_out(program: str, read: str) -> None:
+    library = Library()
+    file = library.put("<text>", program + "\n")
+    assert read in explain_derivative(library.db, file, "f").tangent
+
+
+def test_a_root_of_a_product_is_one_of_squares() -> None:
+    x, a, r = var("x"), var("a"), var("r")
+    product = mul(sub(add(r, a), x), sub(add(r, x), a))
+    assert format_term(readable(prim("sqrt", product), frozenset(), {"x": (0, 1)})) == "sqrt(r^2 - (x - a)^2)"
 
 
 def test_numbers_are_decimals() -> None:

@@ -1,13 +1,13 @@
 """Iverson brackets as conditions, in as few and as plain comparisons as they can be told.
 
-Owns `Condition`, `conditions`, `fewer` and `bracket`. A root is compared by squares, factors that do not change a sign
-are left out, and so is what another condition implies. What two conditions hold between numbers stands between them:
-`-1 < c + x < 0` is c < -x and c + x + 1 > 0.
+Owns `Condition`, `conditions`, `fewer`, `between`, `plainer` and `bracket`. A root is compared by squares, factors that
+do not change a sign are left out, and so is what another condition implies. What two conditions hold between numbers
+stands between them: `-1 < c + x < 0` is c < -x and c + x + 1 > 0.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from fractions import Fraction
 from math import gcd, lcm
 
@@ -15,7 +15,7 @@ from msgspec import Struct
 
 from potto.calculus.algebra.ranges import range_of
 from potto.calculus.algebra.rational_form import as_term, normal
-from potto.core.polynomials import Polynomial
+from potto.core.polynomials import Polynomial, shared_by, without
 from potto.core.printer import format_term
 from potto.core.terms import (
     ONE,
@@ -23,9 +23,11 @@ from potto.core.terms import (
     Branch,
     Prim,
     Term,
+    Var,
     add,
     branch,
     const,
+    div,
     mul,
     neg,
     sub,
@@ -79,7 +81,7 @@ def fewer(known: Iterable[Condition]) -> list[Condition]:
 def bracket(known: Sequence[Condition]) -> Term:
     """1 where all conditions hold, else 0."""
     whole: Term = ONE
-    for item in _between(known):  # the last one is the first that is asked
+    for item in between(known):  # the last one is the first that is asked
         whole = branch((item.surface,), item.strict, whole, ZERO)
     return whole
 
@@ -94,7 +96,7 @@ class _Bound(Struct, frozen=True):
     scaled: bool
 
 
-def _between(known: Sequence[Condition]) -> list[Condition]:
+def between(known: Sequence[Condition]) -> list[Condition]:
     """The same conditions: two bounds of one thing beside each other and alike, so that it stands between them, and no
     fraction of anything."""
     bounds = [_bound(item.surface) for item in known]
@@ -137,6 +139,30 @@ def _surface(bound: _Bound) -> Term | None:
     if added is None or taken is None:
         return None
     return sub(taken, added) if bound.turned else sub(added, taken)
+
+
+def plainer(surface: Term, box: Mapping[str, tuple[float, float]]) -> Term | None:
+    """A surface of the same sign in the box, without factors whose sign is known there: s < 1 for s*x < x where x goes
+    from 0 to 1. None if there are none. Where a variable of the box is 0 a surface may have been 0 as well; that is
+    nothing to an integral over it."""
+    found = normal(surface)
+    if found is None or not found.top:
+        return None
+    turned, parts = False, list[Polynomial]()
+    for form in (found.top, found.below):
+        left: dict[Term, int] = {}
+        for atom, n in shared_by(list(form)).items():
+            bounds = range_of(atom, box)
+            never_zero = not bounds.zero or (isinstance(atom, Var) and atom.name in box)
+            if never_zero and (n % 2 == 0 or bounds.lo >= 0 or bounds.hi <= 0):
+                left[atom] = n
+                turned ^= bool(n % 2) and bounds.lo < 0
+        parts.append({without(m, left): c for m, c in form.items()} if left else form)
+    top, below = map(as_term, parts)
+    if top is None or below is None or (parts[0] is found.top and parts[1] is found.below):
+        return None
+    whole = top if below is ONE else div(top, below)
+    return neg(whole) if turned else whole
 
 
 def opposite(first: Condition, second: Condition) -> bool:

@@ -15,8 +15,8 @@ from msgspec import Struct
 
 from potto.calculus.algebra.ranges import Range, range_of
 from potto.calculus.algebra.rational_form import Rational, normal
+from potto.calculus.explanation.brackets import Condition, between, conditions, fewer, opposite, plainer
 from potto.calculus.explanation.brackets import bracket as bracket_of
-from potto.calculus.explanation.brackets import conditions, fewer, opposite
 from potto.calculus.explanation.factors import Factors, factored, is_tangent, written
 from potto.calculus.surfaces.branch_assignment import box_of
 from potto.core.polynomials import Monomial, Polynomial, shared_by, without
@@ -33,6 +33,7 @@ from potto.core.terms import (
     branch,
     children,
     const,
+    div,
     if_,
     mul,
     neg,
@@ -135,6 +136,8 @@ def _undecided(node: Term, known: Mapping[Term, Term], box: Box, work: _Work) ->
         taken = _taken(new, range_of(new.surface, box))
         if taken is not None:
             return taken
+        if len(new.coordinates) == 1 and (surface := plainer(new.surface, box)) is not None:
+            new = branch((surface,), new.strict, new.then, new.orelse)
     return new if new is node else work.node(new)
 
 
@@ -169,6 +172,9 @@ class _Work:
                 known = conditions(node)
                 if known is not None:
                     return bracket_of(fewer(known))
+                if len(node.coordinates) == 1:
+                    (item,) = between([Condition(node.surface, node.strict)])
+                    return branch((item.surface,), item.strict, node.then, node.orelse)
                 return node
             case Prim(op="hypot"):
                 return _length(node)
@@ -180,6 +186,8 @@ class _Work:
     def _shortest(self, node: Prim) -> Term:
         """The shortest of: the product of its factors, and the node expanded, with the sums in it or around them."""
         forms = [node, *self._signs(node)] if node.op == "add" else [written(factored(node), self.tangents)]
+        if node.op == "sqrt":
+            forms += self._of_squares(node)
         if sum(1 for _ in postorder(node)) <= _MANY:
             whole, sums = self._with_sums_named(node)
             for form, named in ((node, []), (whole, sums)) if sums else ((node, sums),):
@@ -187,6 +195,25 @@ class _Work:
                 if found is not None and len(found.top) <= _SUMMANDS:
                     forms += [self._put_back(each, named) for each in self._expanded(found)]
         return min(forms, key=self._cost)
+
+    def _of_squares(self, node: Prim) -> list[Term]:
+        """sqrt(r^2 - (x - a)^2) for sqrt((r - a + x)*(r + a - x))."""
+        match node.args:
+            case (Prim(op="mul", args=(Prim(op="add") as u, Prim(op="add") as v)),):
+                halves = [normal(div(form, const(2.0))) for form in (add(u, v), add(u, neg(v)))]
+                if any(h is None or not h.top or len(h.top) + 2 > len(u.args) + len(v.args) for h in halves):
+                    return []
+                sides = [self._shortest_sum(h) for h in halves if h is not None]
+                return [prim("sqrt", add(pow_(sides[0], const(2.0)), neg(pow_(sides[1], const(2.0)))))]
+            case _:
+                return []
+
+    def _shortest_sum(self, form: Rational) -> Term:
+        """Up to its sign, what varies inside of an integral first."""
+        whole = self._expanded(form)[1]
+        parts = whole.args if isinstance(whole, Prim) and whole.op == "add" else (whole,)
+        led = [p for p in parts if not p.free.isdisjoint(self.inside)] or list(parts)
+        return _added([neg(p) for p in parts]) if all(map(_is_negative, led)) else whole
 
     def _with_sums_named(self, node: Term) -> tuple[Term, list[tuple[str, Term]]]:
         """The node with a name for each sum that is a factor in it: (x - m)^2 is not taken apart then."""
