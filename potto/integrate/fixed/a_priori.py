@@ -95,6 +95,8 @@ def _stretches(
     places = []
     for row, cell in enumerate(values):
         x, e = float(cell.v), float(cell.e or 0.0)
+        if row > 1 and math.isnan(x):  # a root that is not there
+            continue
         if not math.isfinite(x) or not math.isfinite(e):
             raise _NotPlain
         places.append((x, CLEAR * e, row))
@@ -160,7 +162,7 @@ def beside_bounds(plan: Straight, machine: Evaluator, env: dict[str, Value]) -> 
     What lies between such a cut and its bound has the length 0, whether it is counted or not; how far off the value
     may be is the most that it is with it and without, since rounding hides which of them is right.
     """
-    values = _numbers(plan, env)
+    plan, values = _decided(plan, machine, env)
     if values is None or machine.frozen or machine.side or machine.costs is not None or machine.directions > 1:
         return None
     frame = evaluated(plan.frames[0], machine.tracking(), env)
@@ -230,8 +232,8 @@ def proved_sum(plan: Straight, machine: Evaluator, env: dict[str, Value]) -> Tot
 
 
 def _summed(plan: Straight, machine: Evaluator, env: dict[str, Value]) -> Totals | None:
-    values = None if machine.frozen or machine.side else _numbers(plan, env)
-    if values is None:
+    plan, values = _decided(plan, machine, env)
+    if values is None or machine.frozen or machine.side:
         return None
     frame = evaluated(plan.frames[0], machine.tracking(), env)
     reach, rtol = float(frame[1].v - frame[0].v), min(machine.rtol, LOOSEST)
@@ -292,7 +294,7 @@ class Settled(Struct, frozen=True, eq=False):
 @np.errstate(all="ignore")
 def settled(plan: Straight, machine: Evaluator, env: dict[str, Value]) -> Settled | None:
     """What is known of the integral for all parameters near these; None where that is not settled, or not yet."""
-    values = _numbers(plan, env)
+    plan, values = _decided(plan, machine, env)
     if values is None or machine.frozen or machine.side or machine.costs is not None:
         return None
     low, high, *_ = evaluated(plan.frames[0], machine.tracking(), env)
@@ -306,6 +308,20 @@ def settled(plan: Straight, machine: Evaluator, env: dict[str, Value]) -> Settle
         return None
     box = tuple((name, lo, hi) for name, (lo, hi) in found.box.items())
     return Settled(plan, region, machine, box, _truncation(plan, region, machine.directions, env), faces or [], awaited)
+
+
+def _decided(
+    plan: Straight, machine: Evaluator, env: dict[str, Value]
+) -> tuple[Straight, dict[str, float] | None]:  # fmt: skip
+    """The plan as these parameters decide its choices, and the parameters, if each is one finite number."""
+    values = _numbers(plan, env)
+    if values is not None and plan.choices is not None:
+        met = [float(cell.v) for cell in evaluated(plan.choices, machine, env)]
+        if not all(x in (0.0, 1.0) for x in met):
+            return plan, None
+        plan = plan.decided(tuple(x == 1.0 for x in met))
+        values = {name: values[name] for name in plan.names}
+    return plan, values
 
 
 def _numbers(plan: Straight, env: Mapping[str, Value]) -> dict[str, float] | None:

@@ -9,11 +9,13 @@ few nodes of each cell, spread over it.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 
 import numpy as np
 
+from potto.integrate.fixed.moving_sums import evaluated
 from potto.integrate.fixed.product_rule import CANCELS, FEW, Rule
 from potto.integrate.fixed.proved_shapes import proved_rules
 from potto.integrate.fixed.straight import ROW_BITS, RowNumbers, Straight
@@ -36,13 +38,35 @@ ROUNDED = 1e-12
 
 def by_shapes(
     plan: Straight, degrees: Sequence[int | None], machine: Evaluator, env: dict[str, Value], batch: int
-) -> tuple[Bools, Sums] | None:
-    """Which members were integrated here, and the sums of all (zero for the others); None if none were.
+) -> tuple[Bools, Sums] | None:  # fmt: skip
+    """Which members were integrated here, and the sums of all (zero for the others); None if none were: those for which
+    cuts have the same formulas together.
 
     degrees: of what is integrated over each variable, where it is a polynomial.
     """
     if machine.frozen or machine.side or not all(isinstance(env.get(name), Cell) for name in plan.names):
         return None
+    if plan.choices is None:
+        return _of_one_form(plan, degrees, machine, env, batch)
+    done, sums = np.zeros(batch, dtype=bool), Sums.zeros(1, machine.directions, batch)
+    names = plan.choices.params
+    met = np.array([np.broadcast_to(cell.v, batch) for cell in
+                    evaluated(plan.choices, machine, {name: env[name] for name in names})])  # fmt: skip
+    for sides in itertools.product((False, True), repeat=len(met)):  # what is not known is neither
+        here = np.flatnonzero(np.all([row == side for row, side in zip(met, sides, strict=True)], axis=0))
+        own = plan.decided(sides) if here.size else plan
+        part = env if here.size == batch else gather(env, here)
+        found = _of_one_form(own, degrees, machine, part, here.size) if here.size else None
+        if found is not None:
+            done[here] = found[0]
+            sums = sums.with_members(here, found[1])
+    return (done, sums) if done.any() else None
+
+
+def _of_one_form(
+    plan: Straight, degrees: Sequence[int | None], machine: Evaluator, env: dict[str, Value], batch: int
+) -> tuple[Bools, Sums] | None:
+    """The same where cuts of all have the same formulas."""
     here = {name: env[name] for name in plan.names}
     done = np.zeros(batch, dtype=bool)
     total = [np.zeros((1 + machine.directions, batch)) for _ in range(4)]

@@ -50,8 +50,12 @@ def _around(values: Mapping[str, float], size: Mapping[str, float], part: int = 
 
 
 def _all_over(plan: Straight, of_parameters: Mapping[str, Interval]) -> tuple[Stretch, ...] | None:
-    """The cells that there are all over a box; None where they may not be the same, or cuts be close together."""
+    """The cells that there are all over a box; None where they may not be the same, or cuts be close together, or have
+    other formulas."""
     box = dict(of_parameters)
+    choices = enclosure(tuple([choice for choice, _ in plan.held]), box)
+    if any(low != side or high != side for (low, high), (_, side) in zip(choices, plan.held, strict=True)):
+        return None
     cells: list[Stretch] = []
 
     def over(i: int, path: Path) -> bool:

@@ -16,14 +16,19 @@ from msgspec import Struct
 from numpy.typing import NDArray
 
 from potto.core.terms import (
+    ONE,
+    ZERO,
     Branch,
     Const,
+    If,
     Integral,
     Lam,
     Term,
     Tuple,
+    branch,
     children,
     function_of,
+    if_,
     postorder,
     prim,
     rebuild,
@@ -33,6 +38,7 @@ from potto.integrate.levels import LevelPlan
 from potto.integrate.rules.complex_enclosures import enclosable
 
 MOST_VARIABLES, MOST_CUTS, MOST_TERMS = 3, 13, 600
+MOST_CHOICES = 4  # each of which may double the number of plans
 # Enough for the number of a row in a frame: two bounds, then cuts.
 ROW_BITS = (MOST_CUTS + 1).bit_length()
 RowNumbers = NDArray[np.integer[Any]]  # numbers of rows of frames
@@ -47,7 +53,8 @@ class Straight(Struct, frozen=True, dict=True, eq=False):
     rows where something is like a square root. shared: per variable the bounds that are cuts as well. surfaces: what
     the integrand's branches depend on, as one function to a tuple. names: parameters. regions: what was proved of the
     rules for cells in a region, None where nothing could be. settled: what is known where the cells are the same all
-    over; None where they are not.
+    over; None where they are not. choices: what decides by the parameters alone which formulas cuts have, 1 or 0 each,
+    as for a quadratic's roots; such a plan is of no use before they are `decided`. held: how they were. plans: theirs.
     """
 
     variables: tuple[str, ...]
@@ -63,6 +70,9 @@ class Straight(Struct, frozen=True, dict=True, eq=False):
     lowered: dict[Any, Any] = {}
     alone: dict[Any, Any] = {}
     settled: dict[Any, Any] = {}
+    choices: Lam | None = None
+    held: tuple[tuple[Term, bool], ...] = ()
+    plans: dict[tuple[bool, ...], Straight] = {}
 
     @cached_property
     def items(self) -> tuple[tuple[Term, ...], ...]:
@@ -74,6 +84,15 @@ class Straight(Struct, frozen=True, dict=True, eq=False):
         if found is None:
             side = dict(zip(children(self.surfaces.body), sides, strict=True))
             found = self.faces[sides] = _on_sides(self.body, side)
+        return found
+
+    def decided(self, sides: tuple[bool, ...]) -> Straight:
+        """The plan with the formulas that cuts have where choices fall like this."""
+        assert self.choices is not None
+        found = self.plans.get(sides)
+        if found is None:
+            held = tuple(zip(children(self.choices.body), sides, strict=True))
+            found = self.plans[sides] = _with_choices(self, held)
         return found
 
 
@@ -88,8 +107,10 @@ def straight(term: Integral, body: Term, levels: Sequence[LevelPlan]) -> Straigh
     if len(nodes) > MOST_TERMS:
         return None
     surfaces = tuple(dict.fromkeys(node.surface for node in nodes if isinstance(node, Branch)))
-    cuts = (cut for level in levels for cut in children(level.frame.body))
-    if not all(map(enclosable, (*surfaces, _all_sides(body), *cuts))):
+    cuts = [cut for level in levels for cut in children(level.frame.body)]
+    choices = tuple({choice: None for cut in cuts for node in postorder(cut) if (choice := _choice(node, term))})
+    either = _chosen(tuple_(cuts), dict.fromkeys(choices))
+    if len(choices) > MOST_CHOICES or not all(map(enclosable, (*surfaces, _all_sides(body), *children(either)))):
         return None
     places, frames = zip(*(_distinct(level.frame) for level in levels), strict=True)
     free = body.free.union(*(frame.body.free for frame in frames)) - set(term.variables)
@@ -107,8 +128,51 @@ def straight(term: Integral, body: Term, levels: Sequence[LevelPlan]) -> Straigh
     )
     shared = tuple(frozenset(place[row] for row in place if row > 1) & {0, 1} for place in places)
     return Straight(
-        term.variables, frames, jumps, turning, shared, body, function_of(tuple_(surfaces)), tuple(sorted(free))
+        term.variables, frames, jumps, turning, shared, body, function_of(tuple_(surfaces)), tuple(sorted(free)),
+        choices=function_of(tuple_(choices)) if choices else None,
+    )  # fmt: skip
+
+
+def _choice(node: Term, term: Integral) -> Term | None:
+    """1 or 0, as a condition of the parameters alone is met or not, if one decides what this is."""
+    if not isinstance(node, Branch | If):
+        return None
+    found = _met(node)
+    return found if found.free.isdisjoint(term.variables) else None
+
+
+def _met(node: Branch | If) -> Term:
+    if isinstance(node, If):
+        return if_(node.condition, ONE, ZERO)
+    return branch(node.coordinates, node.strict, ONE, ZERO)
+
+
+def _chosen(term: Term, sides: Mapping[Term, bool | None]) -> Term:
+    """A term with these choices met or not, or, for None, everything in it that there may be: only to be looked at."""
+    memo: dict[Term, Term] = {}
+    for node in postorder(term):
+        if isinstance(node, Branch | If) and (choice := _met(node)) in sides:
+            side, then, orelse = sides[choice], memo[node.then], memo[node.orelse]
+            memo[node] = prim("add", then, orelse) if side is None else then if side else orelse
+        else:
+            memo[node] = rebuild(node, tuple(memo[c] for c in children(node)))
+    return memo[term]
+
+
+def _with_choices(plan: Straight, held: tuple[tuple[Term, bool], ...]) -> Straight:
+    """The plan where choices fall like this; formulas that are the same then are one cut."""
+    places, frames = zip(*(_distinct(function_of(_chosen(tuple_(items), dict(held)))) for items in plan.items),
+                         strict=True)  # fmt: skip
+    jumps = tuple(
+        tuple((surface, tuple({place[row]: None for row in rows})) for surface, rows in level)
+        for level, place in zip(plan.jumps, places, strict=True)
     )
+    turning = tuple(frozenset(place[row] for row in rows) for rows, place in zip(plan.turning, places, strict=True))
+    both = (frozenset(place[row] for row in place if row > 1) & {0, 1} for place in places)
+    shared = tuple(own | more for own, more in zip(plan.shared, both, strict=True))
+    free = plan.body.free.union(*(frame.body.free for frame in frames)) - set(plan.variables)
+    names = tuple(sorted(free))
+    return Straight(plan.variables, frames, jumps, turning, shared, plan.body, plan.surfaces, names, held=held)
 
 
 def nothing(face: Term) -> bool:
