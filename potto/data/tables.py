@@ -41,7 +41,8 @@ class _Layout(Struct, frozen=True):
     origin: int  # the line of the first record, which the others are held against
 
     def column(self, at: int) -> str:
-        return f"column {quoted(self.names[at].strip())}" if self.names else f"column {at + 1}"
+        name = self.names[at].strip() if self.names else ""
+        return f"column {quoted(name)}" if name else f"column {at + 1}"
 
 
 def separated(text: str, tabs: bool) -> Array | Table:
@@ -72,7 +73,7 @@ def _value(layout: _Layout, columns: Sequence[array[float]], texts: frozenset[in
     if layout.names:
         names = identifiers(layout.names)
         kept = ((name, Array((length,), Number(), columns[at])) for at, name in enumerate(names) if at not in texts)
-        return Table(tuple(kept), tuple(names[at] for at in sorted(texts)))
+        return Table(tuple(kept), tuple(names[at] for at in sorted(texts) if layout.names[at].strip()))
     if layout.width == 1:
         return Array((length,), Number(), columns[0])
     flat = array("d", bytes(8 * length * layout.width))
@@ -190,18 +191,23 @@ def _fast(lines: Sequence[str], layout: _Layout) -> list[array[float]] | None:
 
 
 def _of_texts(lines: Sequence[str], layout: _Layout) -> frozenset[int]:
-    """The columns below a header of which no value is a number, or meant as one: names, dates, labels. Not all."""
+    """The columns below a header of which no value is a number, or meant as one: names, dates, labels. Not all.
+
+    One without a name and without any value is left by a separator at the end of each line.
+    """
     if not layout.names:
         return frozenset()
-    of_texts, lacking = set(range(layout.width)), set(range(layout.width))
+    of_texts, lacking, empty = (set(range(layout.width)) for _ in range(3))
     for _, record in islice(_records(lines, layout.delimiter), 1, None):
         for at in list(of_texts) if len(record) == layout.width else ():
             text = record[at].strip()
+            if text:
+                empty.discard(at)
             if _is_number(text, layout.comma) or _MEANT.fullmatch(text):
                 of_texts.remove(at)
             elif text.lower() not in MISSING:
                 lacking.discard(at)
-    found = of_texts - lacking
+    found = of_texts - lacking | {at for at in of_texts & empty if not layout.names[at].strip()}
     return frozenset(found) if len(found) < layout.width else frozenset()
 
 

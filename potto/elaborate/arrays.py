@@ -73,7 +73,7 @@ def field(elaboration: Elaboration, whole: Term, name: str) -> Term:
     place = place_in(elaboration.shapes.of(whole), name)
     if place is None:
         return hole(f"there is no part `{name}`")
-    return _part(elaboration, whole, place)
+    return part_of(elaboration, whole, place)
 
 
 def shaped(elaboration: Elaboration, shape: TupleOf, parts: Sequence[Term]) -> Term:
@@ -93,7 +93,7 @@ def standing(elaboration: Elaboration, whole: Term, type: Type) -> Term:
     match resolve(type):
         case TupleOf(items):
             parts = enumerate(items)
-            return tuple_([standing(elaboration, _part(elaboration, whole, n), item) for n, item in parts])
+            return tuple_([standing(elaboration, part_of(elaboration, whole, n), item) for n, item in parts])
         case ArrayOf(_, item):
             return _each(elaboration, whole, lambda element: standing(elaboration, element, item))
         case _:
@@ -104,7 +104,7 @@ def zeros(elaboration: Elaboration, whole: Term, type: Type) -> Term:
     """The tangent of a value that stands still: a value like it, of zeros."""
     match resolve(type):
         case TupleOf(items) as shape:
-            parts = [zeros(elaboration, _part(elaboration, whole, n), item) for n, item in enumerate(items)]
+            parts = [zeros(elaboration, part_of(elaboration, whole, n), item) for n, item in enumerate(items)]
             return shaped(elaboration, shape, parts)
         case ArrayOf(_, item):
             return _each(elaboration, whole, lambda element: zeros(elaboration, element, item))
@@ -121,7 +121,8 @@ def _each(elaboration: Elaboration, whole: Term, made: Callable[[Term], Term]) -
     return array(place, length(whole), made(index(whole, var(place))))
 
 
-def _part(elaboration: Elaboration, whole: Term, place: int) -> Term:
+def part_of(elaboration: Elaboration, whole: Term, place: int) -> Term:
+    """An item of a tuple, or of a record by the place of its field."""
     if isinstance(whole, App) and elaboration.shapes.makes_record(whole.function):
         return whole.args[place]
     return proj(whole, place)
@@ -365,7 +366,7 @@ def of_vectors(elaboration: Elaboration, name: str, args: Sequence[Term]) -> Ter
         return const(float(len(shape.items))) if isinstance(shape, TupleOf) else length(args[0])
     if name == "norm":
         return apply("sqrt", _dot(elaboration, args[0], args[0]))
-    return _dot(elaboration, *args) if name == "dot" else _cross(*args)
+    return _dot(elaboration, *args) if name == "dot" else _cross(elaboration, *args)
 
 
 def _dot(elaboration: Elaboration, u: Term, v: Term) -> Term:
@@ -377,8 +378,14 @@ def _dot(elaboration: Elaboration, u: Term, v: Term) -> Term:
     return sum_(place, ZERO, sub(size, ONE), mul(element(u, var(place), size), element(v, var(place), size)))
 
 
-def _cross(u: Term, v: Term) -> Term:
-    def minor(i: int, j: int) -> Term:
-        return sub(mul(proj(u, i), proj(v, j)), mul(proj(u, j), proj(v, i)))
+def _cross(elaboration: Elaboration, u: Term, v: Term) -> Term:
+    arrays = isinstance(elaboration.shapes.of(u), ArrayOf)
 
-    return tuple_((minor(1, 2), minor(2, 0), minor(0, 1)))
+    def part(whole: Term, at: int) -> Term:
+        return index(whole, const(float(at))) if arrays else proj(whole, at)
+
+    def minor(i: int, j: int) -> Term:
+        return sub(mul(part(u, i), part(v, j)), mul(part(u, j), part(v, i)))
+
+    parts = (minor(1, 2), minor(2, 0), minor(0, 1))
+    return list_of(parts) if arrays else tuple_(parts)

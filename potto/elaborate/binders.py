@@ -7,35 +7,43 @@ the integral.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from itertools import groupby, product
 
 from potto.core.normal_form import normal_form
 from potto.core.terms import (
     ONE,
+    ZERO,
+    Array,
     Branch,
     If,
+    ListOf,
     Prim,
     Term,
     Tuple,
     add,
+    array,
     branch,
     hole,
     if_,
+    index,
+    length,
     mul,
     proj,
     sub,
+    substitute,
     sum_,
     tuple_,
     var,
 )
 from potto.core.terms import integral as integral_term
-from potto.elaborate.arrays import combined, field, shaped
+from potto.elaborate.arrays import combined, field, part_of, shaped
 from potto.elaborate.context import Elaboration, rule
 from potto.elaborate.shapes import dims_of as size_of_tuple
 from potto.elaborate.values import Scope, Value
 from potto.measures.composed import Part, parts_of, problem
 from potto.syntax import nodes
-from potto.types.types import TupleOf
+from potto.types.types import ArrayOf, TupleOf, Type, resolve
 
 
 @rule(nodes.Integral)
@@ -55,15 +63,61 @@ def _integral(elaboration: Elaboration, node: nodes.Integral, scope: Scope) -> V
                 return hole(f"`{bound.measure}` is not a measure of {len(bound.arguments)} parameters")
             choices.append(parts_of(bound.shape, elaboration.terms(bound.arguments, before)))
         names.append(name)
-    body = elaboration.term(node.body, scope)
-    made = [_integral_over(elaboration, node, tuple(names), parts, body) for parts in product(*choices)]
-    whole = _summed(elaboration, made)
+
+    def over(body: Term) -> Term:
+        made = [_integral_over(elaboration, node, tuple(names), parts, body) for parts in product(*choices)]
+        return _summed(elaboration, made)
+
+    whole = _by_parts(elaboration, elaboration.term(node.body, scope), frozenset(names), over)
     every = [guard for parts in choices for part in parts for guard in part.valid]
     guards = dict.fromkeys(reversed(every))
     for valid, why in guards:
         if not valid.free & set(names) and not _holds(valid):  # a plain condition cannot vary inside the integral
             whole = if_(valid, whole, hole(why, measure=True))
     return whole
+
+
+def _by_parts(elaboration: Elaboration, body: Term, names: frozenset[str], over: Callable[[Term], Term]) -> Term:
+    """The integral of what may have parts within its parts: one integral of all numbers that are in no array, and one
+    of each array, in the shape of the body. over: makes an integral of numbers side by side, or of an array."""
+    shape = elaboration.shapes.of(body)
+    if not _has_parts(shape) and (not isinstance(shape, ArrayOf) or isinstance(body, Array | ListOf)):
+        return over(body)
+    if isinstance(shape, ArrayOf):
+        place = elaboration.fresh("i")
+        elaboration.numbers.add(place)
+        size = length(substitute(body, dict.fromkeys(names, ZERO)))  # which does not vary
+        return array(place, size, _by_parts(elaboration, index(body, var(place)), names, over))
+    numbers: list[Term] = []
+
+    def gather(part: Term) -> None:
+        kind = elaboration.shapes.of(part)
+        if isinstance(kind, TupleOf):
+            for at in range(len(kind.items)):
+                gather(part_of(elaboration, part, at))
+        elif not isinstance(kind, ArrayOf):
+            numbers.append(part)
+
+    gather(body)
+    whole = over(numbers[0] if len(numbers) == 1 else tuple_(numbers)) if numbers else None
+    places = iter(range(len(numbers)))
+
+    def built(part: Term) -> Term:
+        kind = elaboration.shapes.of(part)
+        if isinstance(kind, TupleOf):
+            return shaped(elaboration, kind, [built(part_of(elaboration, part, at)) for at in range(len(kind.items))])
+        if isinstance(kind, ArrayOf) or whole is None:
+            return _by_parts(elaboration, part, names, over)
+        return proj(whole, next(places)) if len(numbers) > 1 else whole
+
+    return built(body)
+
+
+def _has_parts(shape: Type) -> bool:
+    """Whether there is more than numbers in a tuple, or in what an array has."""
+    if isinstance(shape, ArrayOf):
+        return _has_parts(resolve(shape.item))
+    return isinstance(shape, TupleOf) and any(isinstance(resolve(item), TupleOf | ArrayOf) for item in shape.items)
 
 
 def _integral_over(

@@ -27,7 +27,7 @@ Groups = tuple[tuple[Slot, ...], ...]
 class Closure(Struct, frozen=True, eq=False):
     """A function written in the definition at hand. `scope` has the names around it and parameters already given.
 
-    annotated: parameters whose types name sizes.
+    annotated: parameters whose types are written.
     """
 
     groups: tuple[tuple[str, ...], ...]
@@ -62,14 +62,8 @@ EMPTY = Scope({})
 
 
 def annotated(groups: tuple[tuple[nodes.Parameter, ...], ...]) -> tuple[nodes.Parameter, ...]:
-    """The parameters whose types may name sizes."""
-    return tuple(p for group in groups for p in group if p.annotation is not None and _has_size(p.annotation))
-
-
-def _has_size(annotation: nodes.TypeExpr) -> bool:
-    if isinstance(annotation, nodes.ArrayType):
-        return True
-    return isinstance(annotation, nodes.TupleType) and any(map(_has_size, annotation.items))
+    """The parameters whose types are written."""
+    return tuple(p for group in groups for p in group if p.annotation is not None)
 
 
 def sizes(annotation: nodes.TypeExpr, value: Term) -> Iterator[tuple[str, Term]]:

@@ -14,7 +14,7 @@ from potto.diagnostics import Diagnostic
 from potto.quick import quick, value
 from potto.source import Span
 from potto.syntax import kinds
-from potto.syntax.contextual import BEHIND, ENDS_OPERAND, contextual
+from potto.syntax.contextual import BEHIND, ENDS_OPERAND, contextual, uses_parameters
 from potto.syntax.head import BlockTracker
 from potto.syntax.nesting import Nesting
 from potto.syntax.sums import mark_bodies
@@ -72,8 +72,9 @@ class _Lexer:
     has_sum: bool = False
     let_in: int = -1
     """Where the last `in` of a `let` stands."""
+    head_start: int = -1
     head_end: int = -1
-    """Where the parameters of a lambda end that were read last: the dot behind them is the lambda's."""
+    """Where the parameters of a lambda stand that were read last: the dot behind them is the lambda's."""
     head_dot: int = -1
     """Where that dot stands."""
     heads: set[int] = field(default_factory=set)
@@ -162,7 +163,7 @@ class _Lexer:
         if kind == "INTEGRAL":
             self._expect_bounds(word, start, end)
         elif kind == "NAME" and len(self.tokens) > 1 and self._in_head(self.tokens[-2]):
-            self.head_end = end
+            self.head_start, self.head_end = start, end
 
     def _returns(self, end: int) -> bool:
         """Whether `return` starts a line or a body, as it does in other languages."""
@@ -188,13 +189,14 @@ class _Lexer:
     def _operator(self, word: str, start: int, end: int) -> int:
         """An operator or a bracket; gives where to go on."""
         kind = OPERATORS.get(word)
-        if kind == "DOT" and self.tokens and self.tokens[-1].end == self.head_end:
-            self.head_dot = start
-        elif kind == "DOT" and self._is_behind(start):
-            found = _FIELD.match(self.text, start)
-            if found is not None:
+        if kind == "DOT":
+            found = _FIELD.match(self.text, start) if self._is_behind(start) else None
+            in_head = bool(self.tokens) and self.tokens[-1].end == self.head_end
+            if found is not None and not (in_head and not uses_parameters(self.tokens, self.head_start)):
                 self._add("FIELD", found.group(), start, found.end())
                 return found.end()
+            if in_head:
+                self.head_dot = start
         if kind is None:
             word, diagnostic = foreign_operator(self.text, word, Span(start, end))
             self.nesting.report(diagnostic)
@@ -209,7 +211,7 @@ class _Lexer:
             return end
         if kind == "RPAR" or kind == "RSQB":
             if self.nesting.brackets and self.nesting.brackets[-1].start in self.heads:
-                self.head_end = end
+                self.head_start, self.head_end = self.nesting.brackets[-1].start, end
             self.nesting.close_bracket(kind, word, start, end)
             return end
         if kind == "COMMA" and self.nesting.in_ranges() and _ALSO.match(self.text, end):

@@ -157,12 +157,9 @@ def _special(stop: Stop) -> Diagnostic | None:
     opened, at, before = stop.opened, stop.at, stop.before
     if at.kind == "COMMA" and opened is not None and opened.kind == "LET":
         return kinds.UNEXPECTED(at.span, "unexpected `,`", help="separate the names of a `let` by `;`, or by lines")
-    if at.kind == "IF" and _goes_through(stop):
-        help = "let what is not meant count nothing: `sum x in xs (if x > 0 then x else 0)`"
-        return kinds.UNEXPECTED(at.span, "an array has no filter: its size is known before its elements", help=help)
-    if at.kind in ("COLON", "DOTDOT") and opened is not None and opened.kind == "ADJACENT":
-        help = "write the elements that are meant: `[xs[k] for k in 1..3]`"
-        return kinds.UNEXPECTED(at.span, "an index is one place, not a range", help=help)
+    found = _of_arrays(stop) or _behind_with(stop)
+    if found is not None:
+        return found
     unpacked = tuple_without_parentheses(stop)
     if unpacked is not None:
         return unpacked
@@ -199,6 +196,44 @@ def _special(stop: Stop) -> Diagnostic | None:
             "this `for` has no statements",
             help="write them on the lines below, indented; or on the same line after a `:`",
         )
+    return None
+
+
+def _of_arrays(stop: Stop) -> Diagnostic | None:
+    """Stops in arrays and in what goes through them."""
+    opened, at = stop.opened, stop.at
+    kind = "" if opened is None else opened.kind
+    loop = stop.last("SUM", "FOLD") if "SUMBODY" in stop.possible else None  # its body could follow
+    if at.kind == "IF" and (loop is not None or _goes_through(stop)):
+        what = "an array has no filter: its size is known before its elements"
+        what = what if loop is None else f"`{loop.text}` has no filter"
+        help = "let what is not meant count nothing: `sum x in xs (if x > 0 then x else 0)`"
+        return kinds.UNEXPECTED(at.span, what, help=help)
+    if at.kind == "COLON" and loop is not None:
+        what, help = ("step", _FOLD_HELP) if loop.kind == "FOLD" else ("body", _SUM_HELP)
+        message = f"expected the {what} of `{loop.text}` in parentheses, without `:`"
+        return kinds.UNFINISHED(at.span, message, related=_from(loop), help=help)
+    if at.kind in ("COLON", "DOTDOT") and kind == "ADJACENT":
+        help = "write the elements that are meant: `[xs[k] for k in 1..3]`"
+        return kinds.UNEXPECTED(at.span, "an index is one place, not a range", help=help)
+    if at.kind == "FOR" and (kind in _BRACKETS or _goes_through(stop)):
+        help = "an array goes through one range or through several: `[e for i in 1..n, j in 1..m]`"
+        return kinds.UNEXPECTED(at.span, "unexpected `for`", help=help)
+    return None
+
+
+def _behind_with(stop: Stop) -> Diagnostic | None:
+    """`c with a.b = 1`, `c with a = 1, b = 2`."""
+    at, before = stop.at, stop.before
+    if at.kind == "MEMBER" and before is not None and before.kind == "WITH":
+        own, _, inner = at.text.partition(".")
+        help = f"write `c with {own} = (c.{own} with {inner} = …)`"
+        message = f"`with` changes a field of the record, and `{at.text}` is a part of one"
+        return kinds.NOT_A_NAME(at.span, message, help=help)
+    follows = [token.kind for token in stop.tokens[stop.index + 1 : stop.index + 3]]
+    if at.kind == "COMMA" and stop.last("WITH") is not None and follows == ["NAME", "EQ"]:
+        help = "several fields stand in parentheses: `c with (a = 1, b = 2)`"
+        return kinds.UNEXPECTED(at.span, "one field follows `with`", help=help)
     return None
 
 
@@ -296,7 +331,9 @@ def _missing_name(stop: Stop) -> Diagnostic:
             before.span, f"expected {what} after `{before.text}`", help="write `from m import a, b`"
         )
     if stop.at.text:
-        return kinds.NOT_A_NAME(stop.at.span, f"expected a name after `{_shown(before)}`, not `{_shown(stop.at)}`")
+        help = _SUM_HELP if before.kind == "SUM" else ""
+        what = f"expected a name after `{_shown(before)}`, not `{_shown(stop.at)}`"
+        return kinds.NOT_A_NAME(stop.at.span, what, help=help)
     return kinds.NOT_A_NAME(before.span, f"expected a name after `{_shown(before)}`")
 
 
@@ -313,7 +350,7 @@ _GOES_WITH = {
     "SEMI": "a line needs no `;` at its end",
     "COMMA": "to make a tuple, write parentheses around it",
     "TILDE": "`x ~ normal(m, s)` goes among the bounds of an integral",
-    "DOTDOT": "`1..n` goes with `sum`",
+    "DOTDOT": "what goes through a range says so: `[i for i in 1..n]`, `sum i in 1..n (i)`",
     "DOT": "a lambda starts with `\\`",
     "COLON": "a choice is written `p ? a : b`",
     "AS": "`as` goes with an import",

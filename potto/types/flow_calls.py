@@ -88,7 +88,9 @@ def _of_vectors(name: str, arguments: Sequence[Value]) -> Value:
         whole = element(arguments[1]) if name == "interp" else element(element(arguments[0]))
         return _with_sources(whole, _all_of(arguments))
     found = _all_of(arguments)
-    return TupleValue((found, found, found)) if name == "cross" else found
+    if name != "cross":
+        return found
+    return ListValue(found) if any(isinstance(each, ListValue) for each in arguments) else TupleValue((found,) * 3)
 
 
 def _all_of(values: Sequence[Value]) -> Scalar:

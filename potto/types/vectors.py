@@ -98,7 +98,11 @@ def _disagree(left: Type, right: Type, operand: nodes.Operand, problem: tuple[Ty
             label=f"`{shown}` and `{other}`",
             help="take as many of both",
         )
-    help = "write it for each component: `[x + 1 for x in xs]`" if operand.op in "+-" else ""
+    scalar = isinstance(resolve(left), Real) != isinstance(resolve(right), Real)
+    array = isinstance(resolve(right if isinstance(resolve(left), Real) else left), ArrayOf)
+    sign = f" {operand.op} " if operand.op in "+-" else operand.op
+    before, behind = ("1", "x") if isinstance(resolve(left), Real) else ("x", "1")
+    help = f"write it for each component: `[{before}{sign}{behind} for x in xs]`" if scalar and array else ""
     return kinds.TUPLE_ARITHMETIC(
         operand.op_span,
         f"`{operand.op}` has no meaning between {describe(left)} and {describe(right)}",
@@ -220,14 +224,16 @@ def _dot(inference: Inference, node: nodes.Apply) -> Type:
 
 
 def _cross(inference: Inference, node: nodes.Apply) -> Type:
-    found = _types(inference, node, "cross", 2)
-    result = TupleOf((REAL, REAL, REAL))
-    for argument, type in zip(node.arguments, found or ()):
+    found = _types(inference, node, "cross", 2) or []
+    arrays = any(isinstance(resolve(type), ArrayOf) for type in found)
+    result: Type = ArrayOf(Count(3), REAL) if arrays else TupleOf((REAL, REAL, REAL))
+    for argument, type in zip(node.arguments, found):
         if not unify(type, result):
             inference.report(kinds.SIZES(
                 argument.value.span, f"`cross` takes vectors of three numbers, but this is {describe(type)}",
-                label=f"this is `{format_type(type)}`",
+                label=f"this is `{format_type(type)}`", help="both are tuples, `(a, b, c)`, or both are arrays",
             ))  # fmt: skip
+            break
     return result
 
 

@@ -112,6 +112,50 @@ def test_an_integral_of_an_array_is_an_array() -> None:
     assert potto.grad(M.moments)(2.0).tangent == pytest.approx([2, 4, 8], rel=1e-12)
 
 
+def test_an_integral_has_the_shape_of_what_is_integrated() -> None:
+    """Moments of [x < t] are t^(k + 1)/(k + 1): polynomials, exact but for roundings."""
+    module = potto.compile(r"""
+record Ray(start: (Real, Real), length: Real)
+record Bundle(first: Ray, weights: [n] Real)
+fixed = [1, 2]
+def nested(t) integral [0, 1] ([x < t], (x*[x < t], 2)) d(x)
+def listed(t) integral [0, 1] (x*[x < t], [[x < t], 3]) d(x)
+def length(t) (integral [0, 1] Ray(start=([x < t], 1), length=x*[x < t]) d(x)).length
+def rays(n, t) integral [0, 1] [Ray(start=(i, 1), length=i*[x < t]) for i in 1..n] d(x)
+def bundle(t) integral [0, 1] Bundle(first=Ray(start=(1, t), length=[x < t]), weights=[x, t*x]) d(x)
+def whole(t) integral [0, t] fixed d(x)
+def drawn(t) integral (x ~ poisson(t)) ((x, x^2), [3*x]) d(x)
+def whole_of(f: Real* -> [2] Real*) integral [0, 1] f(x) d(x)
+def called(t) whole_of(\x . [x, t*x])
+""")
+    t = 0.5
+    first, second = module.nested(t).value
+    assert (first, *second) == pytest.approx((t, t**2 / 2, 2), rel=1e-14)
+    value, listed = module.listed(t).value
+    assert (value, listed.tolist()) == (pytest.approx(t**2 / 2, rel=1e-14), pytest.approx([t, 3], rel=1e-14))
+    assert module.length(t).value == pytest.approx(t**2 / 2, rel=1e-14)
+    assert potto.grad(module.length)(t).tangent == pytest.approx(t, rel=1e-14)
+    assert [each[1] for each in potto.grad(module.rays, ["t"])(2, t).tangent] == pytest.approx([1, 2], rel=1e-14)
+    first, weights = potto.grad(module.bundle)(t).tangent
+    assert (first, weights.tolist()) == (((0, 1), 1), pytest.approx([0, 0.5], rel=1e-14))
+    assert module.whole(3).value.tolist() == pytest.approx([3, 6], rel=1e-15)
+    assert potto.grad(module.whole)(3).tangent.tolist() == pytest.approx([1, 2], rel=1e-14)
+    assert module.called(3).value.tolist() == pytest.approx([0.5, 1.5], rel=1e-14)
+    (mean, square), (third,) = module.drawn(2.0).value
+    assert (mean, square, third) == pytest.approx((2, 6, 6), rel=1e-9)  # to where the sum over whole numbers is cut
+
+
+def test_gradients_of_lambdas_whose_parameters_have_types() -> None:
+    module = potto.compile(r"""
+record P(x: Real, y: Real)
+of_record = grad(\(p: P) . p.x^2*p.y)
+of_tuple = grad(\(p: (Real, [2] Real)) . p.0*p.1[0]*p.1[1])
+""")
+    assert tuple(module.of_record((3.0, 4.0)).value) == (24, 9)
+    first, rest = module.of_tuple((3.0, [4.0, 5.0])).value
+    assert (first, list(rest)) == (20, [15, 12])
+
+
 def test_what_a_plain_condition_excludes_is_not_read() -> None:
     assert M.guarded([5, 7], 0).value == pytest.approx(0.5, rel=1e-15)
     assert M.guarded([5, 7], 1).value == pytest.approx(2.5, rel=1e-15)
@@ -178,11 +222,13 @@ def length_of(u: (Real, Real, Real)) norm(u)
 def plane(n: (Real, Real, Real), p: (Real, Real, Real), q: (Real, Real, Real)) dot(n, q - 2*p)/norm(n)
 def turned(u: (Real, Real, Real), v: (Real, Real, Real)) cross(u, v)
 def mixed(xs: [n] Real, ys: [n] Real) dot(xs + 2*ys, -xs/2)
+def turned_array(u: [3] Real, v: [3] Real) cross(u, v)
 """)
     u, v, w = (1.0, 2.0, 2.0), (0.5, -1.0, 3.0), (2.0, 1.0, 1.0)
     assert module.length_of(u).value == 3
     assert module.plane(u, v, w).value == pytest.approx(np.dot(u, np.subtract(w, np.multiply(2, v))) / 3, rel=1e-15)
     assert module.turned(u, v).value == pytest.approx(tuple(np.cross(u, v)), rel=1e-15)
+    assert module.turned_array(list(u), list(v)).value == pytest.approx(np.cross(u, v), rel=1e-15)
     xs, ys = np.array([1.0, 2.0]), np.array([-1.0, 0.5])
     assert module.mixed(xs, ys).value == pytest.approx(np.dot(xs + 2 * ys, -xs / 2), rel=1e-15)
     assert potto.grad(module.length_of)(u).tangent == pytest.approx(tuple(np.divide(u, 3)), rel=1e-15)

@@ -370,4 +370,16 @@ def test_arrays_and_folds() -> None:
         #       ^^ error[P0103]: an index is one place, not a range
         x = [2*y for y in [1, 2] if y > 1]
         #                        ^^ error[P0103]: an array has no filter: its size is known before its elements
+        x = sum y in ys if y > 1 (y)
+        #               ^^ error[P0103]: `sum` has no filter
+        x = sum i in 1..3: i
+        #                ^ error[P0104]: expected the body of `sum` in parentheses, without `:`
+        x = fold s = 0 for i in 1..3: s + i
+        #                           ^ error[P0104]: expected the step of `fold` in parentheses, without `:`
+        x = [(i, j) for i in 1..2 for j in 1..2]
+        #                         ^^^ error[P0103]: unexpected `for`
+        x = c with a = 1, b = 2
+        #               ^ error[P0103]: one field follows `with`
+        x = c with a.b = 1
+        #          ^^^ error[P0115]: `with` changes a field of the record, and `a.b` is a part of one
     """)

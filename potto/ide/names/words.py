@@ -106,8 +106,8 @@ _SPECIALS = (
     Special("norm", "[n] Real -> Real", "The length of a vector, a tuple or an array of numbers.",
             "d norm(u) = dot(u, du)/norm(u)", "norm((3, 4))", ("u",)),
     Special("cross", "((Real, Real, Real), (Real, Real, Real)) -> (Real, Real, Real)",
-            "The cross product of two vectors of three numbers.", "d cross(u, v) = cross(du, v) + cross(u, dv)",
-            "cross((1, 0, 0), (0, 1, 0))", ("u", "v")),
+            "The cross product of two vectors of three numbers, tuples or arrays.",
+            "d cross(u, v) = cross(du, v) + cross(u, dv)", "cross((1, 0, 0), (0, 1, 0))", ("u", "v")),
     Special("interp", "(xs: [n] Real, ys: [n] a, x: Real*) -> a",
             "Piecewise linear through the values `ys` at the places `xs`, which rise; beyond them the value "
             "at the end. The places are kinks that the integrator knows. The values may be tuples, arrays or records.",
