@@ -17,6 +17,7 @@ from potto.applications.integral_pictures import integral_svg, remarks, told
 from potto.applications.integral_scenes import IntegralScene, Shot
 from potto.applications.integral_views import FRAME
 from potto.calculus.explanation.layout import DerivativeText
+from potto.checking.facts import show_equation
 from potto.diagnostics import PottoError
 from potto.evaluating.world import World
 from potto.ide.display.scenes import scenes
@@ -24,7 +25,7 @@ from potto.ide.display.views import viewed
 from potto.ide.hover.derivatives import derivative_text
 from potto.modules import chunk_start
 from potto.projects.settings import settings
-from potto.syntax.typesetting import mathml
+from potto.syntax.typesetting import mathml, unicode
 
 QUICK = 1e-4  # the accuracy of what is seen while a slider is dragged: less than a pixel
 MOST = 400  # characters of a formula that is shown
@@ -130,6 +131,11 @@ def _parts(found: DerivativeText) -> list[tuple[int, str, str]]:
 
 def _surfaces(shot: Shot) -> list[dict[str, Any]]:
     return [
-        {"equation": s.equation, "condition": s.condition, "inside": bool(s.lines), "gain": s.gain}
+        {
+            "equation": show_equation(unicode)(s.equation),
+            "condition": s.condition,
+            "inside": bool(s.lines),
+            "gain": s.gain,
+        }
         for s in shot.view.surfaces
     ]

@@ -17,7 +17,9 @@ import numpy as np
 
 from potto.applications.integral_views import Arrow, IntegralNumbers, IntegralView, Line
 from potto.applications.png import encode
+from potto.checking.facts import show_equation
 from potto.runtime.answers.printing import format_digits, format_number
+from potto.syntax.typesetting import unicode
 
 WIDE, TALL, LEFT, TOP, LINE = 420.0, 300.0, 64.0, 40.0, 20.0
 STYLE = (
@@ -80,7 +82,7 @@ def integral_svg(view: IntegralView, said: Sequence[Said] = (), dark: bool = Fal
     parts += _axes(view, frame)
     title, below = said[:1], said[1:]
     start = TOP + frame.tall + 58
-    parts += [_text(LEFT, 22, title[0][0], "start", 'font-weight="bold"')] if title else []
+    parts += [_text(LEFT, 16, title[0][0], "start", 'font-weight="bold"')] if title else []
     parts += [_text(LEFT, start + LINE * n, line, "start", f'class="{kind}"') for n, (line, kind) in enumerate(below)]
     tall = start + LINE * len(below) + 6 if said else start - 16
     wide = LEFT + max(frame.wide, WIDE if said else 0.0) + (90 if said else 24)
@@ -98,7 +100,8 @@ def words(view: IntegralView, numbers: IntegralNumbers | None, title: str, wrt: 
     if numbers is not None and not numbers.converged:
         found.append(("not as accurate as was asked", "loss"))
     for surface in view.surfaces:
-        found.append((surface.equation if surface.lines else f"{surface.equation}: not in the domain", "edge"))
+        equation = show_equation(unicode)(surface.equation)
+        found.append((equation if surface.lines else f"{equation}: not in the domain", "edge"))
     return [*found, *((text, "quiet") for text in remarks(view))]
 
 
@@ -215,7 +218,7 @@ def _axes(view: IntegralView, frame: _Frame) -> list[str]:
         out.append(_text(frame.x(across), foot + 17, format_digits(across, 4), "middle"))
         out.append(_text(LEFT - 6, frame.y(up) + 4, format_digits(up, 3), "end"))
     out.append(_text(LEFT + frame.wide / 2, foot + 34, names[0], "middle", 'font-style="italic"'))
-    out.append(_text(LEFT - 24, TOP - 12, names[1], "start", 'font-style="italic"'))
+    out.append(_text(LEFT - 24, TOP - 9, names[1], "start", 'font-style="italic"'))
     return out
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -216,3 +217,14 @@ def test_the_picture_is_xml_with_a_group_for_each_surface() -> None:
 def test_what_cannot_be_seen_says_why(name: str, wrt: str, which: int, says: str) -> None:
     with pytest.raises(PottoError, match=says):
         looked(name, wrt, which, t=0.5)
+
+
+def test_what_stands_beside_a_picture_does_not_lie_on_other_words() -> None:
+    """The title, what goes up, and the greatest number of the scale; surfaces are set as mathematics is."""
+    root = ElementTree.fromstring(looked("disc", "r", r=0.5).svg)
+    texts = [(float(t.get("y", "nan")), t.text) for t in root.iter("{http://www.w3.org/2000/svg}text")]
+    for flat in (looked("step", "t", t=0.3).svg, looked("disc", "r", r=0.5).svg):
+        above = sorted(float(t.get("y", "nan")) for t in ElementTree.fromstring(flat).iter(
+            "{http://www.w3.org/2000/svg}text") if float(t.get("y", "nan")) < 50)  # fmt: skip
+        assert len(above) == 3 and min(b - a for a, b in pairwise(above)) >= 12
+    assert any("x² + y² = r²" in (text or "") for _, text in texts)
