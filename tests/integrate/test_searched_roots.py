@@ -20,6 +20,7 @@ import potto
 from potto.calculus.solving.enclosable import slope_of
 from potto.core.terms import add, const, mul, prim, sub, var
 from potto.integrate.decomposition.root_isolation import isolated
+from potto.integrate.events import BUDGET_SPENT, ROOTS_NOT_SEPARATED
 from potto.integrate.rules.intervals import enclosure
 from potto.kernels.cells import Cell
 
@@ -131,6 +132,17 @@ def test_an_enclosure_holds_what_its_term_takes() -> None:
     for term, (lo, hi), value in zip(terms, found, values, strict=True):
         known = ~np.isnan(value)
         assert np.all((value >= lo) | ~known) and np.all((value <= hi) | ~known), term
+
+
+def test_a_search_counts_for_the_budget_and_says_what_it_has_not_seen() -> None:
+    """Some 300 roots take more cells than 10 evaluations stand for (64 each), and fewer than 1,000 do."""
+    wave = potto.compile("def f(t) integral [0, 1] x*[cos(500*x) + cos(707*x) < t + x] d(x)").f
+    with potto.settings(max_evals=10):
+        found = wave(0.2)
+    assert {BUDGET_SPENT.message, ROOTS_NOT_SEPARATED.message} <= set(found.reasons)
+    assert not found.converged and math.isinf(found.error)
+    with potto.settings(max_evals=1000):
+        assert wave(0.2).converged
 
 
 def test_roots_between_infinite_bounds_where_terms_of_the_surface_have_no_sum() -> None:

@@ -7,6 +7,8 @@ no root is missed, however narrow what brings it forth; what is given up on, onc
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from msgspec import Struct
 
@@ -41,11 +43,12 @@ class Brackets(Struct):
 
 def isolated(
     surface: Term, slope: Term, variable: str, env: dict[str, Value], low: Array, high: Array, jumps: bool = True,
-    backend: str = "numpy",
+    backend: str = "numpy", within: Callable[[int], bool] = lambda cells: True,
 ) -> Brackets:  # fmt: skip
     """The sign changes of a surface between bounds (B,), which may be infinite.
 
     jumps: whether something jumps there, so that what hides roots is left as it is; a kink is wanted to the last digit.
+    within: whether so many more cells are within the budget.
     """
     (surface, slope), env = flat((surface, slope), env)
     fixed: dict[str, Interval] = {}
@@ -63,7 +66,7 @@ def isolated(
     for _ in range(FINEST):
         if not owner.size:
             break
-        if owner.size > most:
+        if owner.size > most or not within(owner.size):
             complete = False
             break
         settled, crossed, open_, shallow = cells.judged(owner, s0, s1)

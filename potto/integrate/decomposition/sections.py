@@ -20,7 +20,7 @@ from potto.core.terms import Lam, Term, function_of
 from potto.integrate.columns import side_by_side
 from potto.integrate.decomposition.meetings import SEARCHED, Row, as_array
 from potto.integrate.decomposition.root_isolation import at_label, between, isolated
-from potto.integrate.events import ROOTS_NOT_SEPARATED, TOO_MANY_ROOTS, Unsearched
+from potto.integrate.events import BUDGET_SPENT, ROOTS_NOT_SEPARATED, TOO_MANY_ROOTS, Unsearched
 from potto.integrate.levels import LevelPlan
 from potto.integrate.pieces import gather, still
 from potto.integrate.rules.gauss import EPS
@@ -132,9 +132,12 @@ class _Along(Struct, frozen=True, dict=True):
             a, b = in_rows(*self.on_a_grid(low, high), batch)
         else:
             brackets = isolated(
-                self.surface, slope, self.variable, self.env, low, high, self.decides, self.machine.backend
-            )
+                self.surface, slope, self.variable, self.env, low, high, self.decides, self.machine.backend,
+                self.machine.isolates,
+            )  # fmt: skip
             most = brackets.owner.size if self.decides else MOST_KINKS * batch
+            if not brackets.complete and self.machine.overdrawn():  # more of it might help
+                self.machine.note(BUDGET_SPENT)
             if self.decides and not brackets.complete:
                 self.machine.note(ROOTS_NOT_SEPARATED)
             elif not brackets.complete or brackets.owner.size > most:

@@ -54,6 +54,8 @@ from potto.runtime.evaluation.record import Record
 DEEPEST_CALLS = 3000
 MOST_TERMS = 10_000_000
 OVERDRAFT = 3
+# The same where the roots of a condition are searched for: 2,000 asked are some 100,000 cells, half a second or two.
+GIVEN_UP = 64
 
 
 Groups = tuple[tuple[Value, ...], ...]
@@ -186,6 +188,12 @@ class Machine:
     def search(self, boxes: int) -> bool:
         """Note that places are searched for in so many boxes more. Whether that is within the budget."""
         return self.record.search(boxes)
+
+    def isolates(self, cells: int) -> bool:
+        """Note that roots are looked for on so many stretches more. Whether the search may go on: roots that are not
+        found leave no error that is known, so that it is given up late."""
+        self.record.cells += cells
+        return self.record.spent <= GIVEN_UP * self.settings.max_evals
 
     def exhausted(self) -> bool:
         return self.record.spent > self.settings.max_evals

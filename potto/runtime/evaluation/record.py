@@ -114,7 +114,8 @@ class Record(Struct):
     nodes and the members of these.
     within: the error up to which what cancels is 0 as accurately as asked for, of all or of each of the batch.
     culled: integrals that are 0 for certain, and were not evaluated.
-    start, members: how many evaluations had been done before those that count, and for how many members these are.
+    cells: on how many stretches roots have been looked for; each counts as an evaluation where a budget is asked.
+    start, members: how much had been done before what counts, and for how many members this is.
     boxes, most_boxes: in how many boxes places have been searched for, and in how many they may be for each member.
     """
 
@@ -129,6 +130,7 @@ class Record(Struct):
     within: Any = 0.0
     start: int = 0
     members: int = 1
+    cells: int = 0
     boxes: int = 0
     most_boxes: int = MOST_BOXES
     integrals: int = 0
@@ -139,8 +141,12 @@ class Record(Struct):
 
     @property
     def spent(self) -> float:
-        """The evaluations that count, of one member."""
-        return (self.evaluations - self.start) / self.members
+        """The evaluations that count, of one member, and what roots took that were searched for."""
+        return (self.effort - self.start) / self.members
+
+    @property
+    def effort(self) -> int:
+        return self.evaluations + self.cells
 
     def meet(self, edge: OneSidedDerivatives) -> None:
         """Note something that has two derivatives."""
@@ -177,12 +183,12 @@ class Record(Struct):
     @contextmanager
     def among(self, members: int) -> Iterator[None]:
         """In this block so many members of the batch are all that there are, with a budget of their own."""
-        kept, boxes = (self.start, self.members, self.evaluations), self.boxes
-        self.boxes, self.start, self.members = 0, self.evaluations - round(self.spent * members), members
+        kept, boxes = (self.start, self.members, self.effort), self.boxes
+        self.boxes, self.start, self.members = 0, self.effort - round(self.spent * members), members
         try:
             yield
         finally:
-            self.start, self.members = kept[0] + self.evaluations - kept[2], kept[1]
+            self.start, self.members = kept[0] + self.effort - kept[2], kept[1]
             self.boxes += boxes
 
     def search(self, boxes: int) -> bool:
