@@ -84,8 +84,8 @@ tanh = register(
         roots=(0.0,),
         parity=-1,
         doc="The hyperbolic tangent.",
-        # Not 1 - tanh^2, which cancels for large x; dividing twice keeps cosh^2 from overflowing.
-        partials=lambda x: (div(div(ONE, prim("cosh", x)), prim("cosh", x)),),
+        # Not 1 - tanh^2, which cancels for large x, nor 1/cosh^2, whose derivative is inf/inf there.
+        partials=lambda x: (mul(prim("sech", x), prim("sech", x)),),
         domain=((-300.0, 300.0),),
         inverse=lambda y: (prim("atanh", y),),
         increasing=1,

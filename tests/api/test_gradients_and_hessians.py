@@ -103,6 +103,13 @@ def test_arrays_and_functions_stand_beside_the_vector() -> None:
     np.testing.assert_allclose(potto.hvp(m.f, {"t": 1.0})(t, m.square).tangent, 2 * t, rtol=1e-12)
 
 
+def test_a_guard_beside_a_hole() -> None:
+    """s*sin(t)/t bends by -s/3 in t at t = 0: to eight digits, by what lies beside t = 0."""
+    m = potto.compile("def f(t, s) if t == 0 then s else s*sin(t)/t")
+    found = potto.hessian(m.f, wrt=["t", "s"])(0.0, 1.5)
+    assert (np.abs(found.value - [[-0.5, 0.0], [0.0, 0.0]]) <= found.error + 1e-15).all() and found.error.max() <= 1e-8
+
+
 def test_what_has_no_second_derivative_says_so() -> None:
     """The derivative of [x < a][x < b] jumps where a = b: a product of deltas on one surface."""
     m = potto.compile("def f(a, b) integral [0, 1] [x < a]*[x < b] d(x)")

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from lint import lint
 from mpmath import mp
 
+import potto
 from potto.calculus.differentiation.derivative import partial
 from potto.core.reference import evaluate, function
 from potto.core.terms import Const, Prim, const, postorder, prim, sub, var
@@ -251,3 +252,18 @@ def test_kinks_are_where_the_sides_meet() -> None:
     assert PRIMITIVES["pow"].edges(a, const(2.0)) == ()
     assert PRIMITIVES["pow"].edges(a, const(0.5)) == (a,)
     assert isinstance(PRIMITIVES["neg"].inverse(const(2.0))[0], Const)  # type: ignore[misc]
+
+
+@pytest.mark.parametrize("order", [0, 1])
+def test_bessel_functions_far_out(order: int) -> None:
+    """The phase x - pi/4 is not rounded: within 4e-16, as the registry says, at 10 and at 1e8."""
+    f = potto.compile(f"def f(x) besselj{order}(x)").f
+    for x in (10.0, 24.9, 25.1, 1e3, 12345.678, -1e4, 1e8):
+        found = f(x)
+        with mp.workdps(40):
+            assert abs(found.value - mp.besselj(order, x)) <= found.error <= 5e-16
+
+
+def test_the_bend_of_tanh_far_out() -> None:
+    """0 from 800 on, where cosh is more than a double holds."""
+    assert potto.hessian(potto.compile("def f(x) tanh(x)").f)(800.0).value == 0.0

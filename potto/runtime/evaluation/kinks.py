@@ -51,6 +51,8 @@ def _note_jump(machine: Machine, surface: Term, near: Bools, args: tuple[Cell, .
     """Note where what is at a jump moves: derivatives that nobody knows by the jump alone."""
     tapes = machine.taping and any(arg.t[0] is not None for arg in args)
     rows = [[x for arg in args if (x := arg.t[d]) is not None] for d in range(machine.directions)]
+    # The numbers may be the same for all that is asked at once, and move in as many ways, as for a Hessian.
+    near = np.broadcast_to(near, np.broadcast_shapes(near.shape, *(np.shape(x) for row in rows for x in row)))
     moves = np.array([near & (tapes | np.any([np.broadcast_to(x != 0, near.shape) for x in row], axis=0))
                       if row else np.zeros_like(near) for row in rows])  # fmt: skip
     cause = TwoSided("", surface)

@@ -41,12 +41,14 @@ def as_a_whole(machine: Machine, term: Term, given: Value, run: Run) -> Value:
     kept = dict(record.shortfalls), record.edges[:known], record.within
     value = pad(value, machine.directions)
     jumps = [edge for edge in met if edge.cause.jump]
+    batch = _batch(given)
     try:
         if jumps:
-            sides = [_led_to(machine, given, run, value, side) for side in (-1, 1)]
+            sides = [_led_to(machine, given, run, _numbers(value, machine.directions, batch), side) for side in (-1, 1)]
         else:
             sides = [
-                _numbers(run(machine.apart().changed(side=side), given), machine.directions)[2:] for side in (-1, 1)
+                _numbers(run(machine.apart().changed(side=side), given), machine.directions, batch)[2:]
+                for side in (-1, 1)
             ]
     except PottoError:  # a number that counts something: beside it there is nothing
         return value
@@ -59,7 +61,7 @@ def as_a_whole(machine: Machine, term: Term, given: Value, run: Run) -> Value:
         if not same.all():
             where = same.all(axis=(0, 1)) if same.ndim > 2 else np.zeros((), dtype=bool)
             record.edges.append(_note(met[0].cause, where, backward, forward, before, beyond))
-        _, _, slopes, off = _numbers(value, machine.directions)
+        _, _, slopes, off = _numbers(value, machine.directions, batch)
         nearer = np.abs(slopes - backward) < np.abs(slopes - forward)
         t = np.where(same, 0.5 * (backward + forward), np.where(nearer, backward, forward))
         et = np.where(same, np.maximum(before, beyond), np.where(nearer, before, beyond))
@@ -97,10 +99,10 @@ def _note(cause: TwoSided, left_out: Any, *sides: Array) -> OneSidedDerivatives:
     return OneSidedDerivatives(cause, *(side.reshape(-1, *side.shape[2:]) for side in flat))
 
 
-def _led_to(machine: Machine, given: Value, run: Run, value: Value, side: int) -> tuple[Array, Array]:
+def _led_to(machine: Machine, given: Value, run: Run, here: Parts, side: int) -> tuple[Array, Array]:
     """The tangents of all numbers of a value to a side, (numbers, directions, …), and how far off they may be, as
-    those beside what is given lead to them."""
-    v, e, t, et = _numbers(value, machine.directions)
+    those beside what is given lead to them. here: the numbers themselves, and their tangents."""
+    batch, (v, e, t, et) = _batch(given), here
     t, et = t.copy(), et.copy()
     for d in range(machine.directions):
         step = parameter_step((given,), d)
@@ -109,18 +111,23 @@ def _led_to(machine: Machine, given: Value, run: Run, value: Value, side: int) -
 
         def at(h: float, d: int = d) -> Parts:
             beside = run(machine.apart().with_directions(1), moved(one_direction(given, d), h, 0))
-            w, off, slopes, unsure = _numbers(beside, 1)
+            w, off, slopes, unsure = _numbers(beside, 1, batch)
             return w, off, slopes[:, 0], unsure[:, 0]
 
         t[:, d], et[:, d] = approached(at, side * step, (v, e), machine.rtol)
     return t, et
 
 
-def _numbers(value: Value, directions: int) -> tuple[Array, Array, Array, Array]:
+def _batch(given: Value) -> tuple[int, ...]:
+    """The shape of all that is evaluated at once; what is the same for all of it may have none."""
+    return np.broadcast_shapes(*(np.shape(x) for cell in all_cells(given) for x in (cell.v, *cell.t) if x is not None))
+
+
+def _numbers(value: Value, directions: int, batch: tuple[int, ...]) -> Parts:
     """All numbers of a value, how far off they are, their tangents, (numbers, directions, …), and how far off those
     are."""
     cells = all_cells(pad(value, directions))
-    shape = np.broadcast_shapes(*(np.shape(cell.v) for cell in cells))
+    shape = np.broadcast_shapes(batch, *(np.shape(cell.v) for cell in cells))
 
     def rows(of: Callable[[Cell], Iterable[Number | None]]) -> Array:
         found = [[np.broadcast_to(0.0 if x is None else x, shape) for x in of(cell)] for cell in cells]
