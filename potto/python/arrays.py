@@ -254,5 +254,7 @@ def _agree(name: str, count: int, size: Type, sizes: Sizes) -> None:
         raise wrong_call(f"`{name}` has {found.number} elements, and is given {count}")
     if isinstance(found, SizeVar):
         other, known = sizes.setdefault(found.name, (name, count - offset))
+        if known != count - offset and other == name:
+            raise wrong_call(f"`{name}` has parts of one size, but is given {known + offset} and {count} elements")
         if known != count - offset:
             raise wrong_call(f"`{name}` has {known + offset} elements, as `{other}` says, and is given {count}")

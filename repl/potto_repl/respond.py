@@ -10,7 +10,7 @@ import re
 from collections.abc import Iterator
 
 from potto.diagnostics import PottoError
-from potto.reports.render import Located, ProgramError
+from potto.reports.render import Located, ProgramError, display_name
 from potto_repl import commands as _commands  # noqa: F401  (fills the table)
 from potto_repl.editing import flush_left
 from potto_repl.registry import Result, find
@@ -21,6 +21,8 @@ _QUESTION = re.compile(r"\s*([^\W\d][\w.']*|:\w+)\s*(\?{1,2})\s*")
 
 # What other prompts are left and asked with; names that are defined go first.
 _WORDS = {"?": "help", "help": "help", "help()": "help"} | dict.fromkeys(("quit", "exit", "quit()", "exit()"), "quit")
+
+_READ_AGAIN = (":reload", ":load")  # which say themselves what has changed
 
 
 def respond(session: Conversation, text: str) -> Reply:
@@ -64,6 +66,8 @@ def _guarded(session: Conversation, text: str) -> Iterator[Part]:
             from potto_repl.following import refreshed
 
             yield from refreshed(session, quiet=True)
+        elif not text.lstrip().startswith(_READ_AGAIN):
+            yield from _data_read_again(session)
         yield from _answered(session, text)
     except Refusal as refusal:
         yield from refusal.parts
@@ -78,6 +82,13 @@ def _guarded(session: Conversation, text: str) -> Iterator[Part]:
         yield Part("error", f"the system says: {(error.strerror or str(error)).lower()}{where}")
     except Exception as error:
         yield from _crashed(text, error)
+
+
+def _data_read_again(session: Conversation) -> Iterator[Part]:
+    """Files of data mean what they hold: what a program had read of them is of no use once they have changed."""
+    files = session.world.files
+    for changed in files.refresh(files.data_files()):
+        yield note(f"{display_name(changed)} has changed, and is read again")
 
 
 def _answered(session: Conversation, text: str) -> Iterator[Part]:

@@ -327,6 +327,19 @@ def test_a_file_of_data_that_is_edited(talk):
     assert talk.data("sum h in people.height (h)")["value"] == 3
 
 
+def test_data_of_an_entry_are_read_again_without_being_asked(talk):
+    talk.write("people.csv", "height\n1\n3\n")
+    talk.all(f'people = load("{talk.folder / "people.csv"}")', "total = sum h in people.height (h)", "total")
+    talk.write("people.csv", "height\n1\n3\n8\n")
+    reply = talk("total")
+    assert "people.csv has changed, and is read again" in reply.text and "= 12 " in reply.text
+    assert "again" not in talk("total").text
+    talk.write("people.csv", "height\n1\nx\n")
+    assert "line 3, column `height`" in talk("total").text
+    talk.write("people.csv", "height\n5\n6\n")
+    assert talk.data("total")["value"] == 11
+
+
 def test_load_says_what_is_wrong(talk):
     talk.write("renderer.po", "def f(t) t")
     assert "did you mean `renderer.po`?" in talk(":load rendrer.po").text

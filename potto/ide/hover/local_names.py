@@ -32,7 +32,7 @@ TITLES = {
     "parameter": "parameter",
     "local": "local name",
     "variable": "variable of integration",
-    "index": "index of a sum",
+    "index": "index",
     "loop": "loop variable",
 }
 
@@ -53,7 +53,7 @@ def local_markdown(db: Database, symbol: LocalSymbol, file: str) -> str:
         lines.append(f"d{symbol.prefix}{binder.name} : {format_type(derived)}")
     what = TITLES[binder.kind]
     if name is not None:
-        what += f" of {code(name)}"
+        what += f" {'in' if binder.kind == 'index' else 'of'} {code(name)}"
     parts = [fence("\n".join(lines)), what]
     match binder.kind:
         case "variable":
