@@ -38,13 +38,12 @@ from potto.elaborate.arrays import as_long_as, loaded, of_vectors, standing
 from potto.elaborate.context import Elaboration, rule
 from potto.elaborate.filling import Filling, Given, Packed, Spread, fill
 from potto.elaborate.lookups import image, interp
-from potto.elaborate.signatures import groups_of_term
+from potto.elaborate.signatures import groups_of_term, unnamed
 from potto.elaborate.slopes import slope
 from potto.elaborate.values import Builtin, Closure, Groups, Scope, Value, counted
 from potto.modules.builtins import DERIVATIVES, VECTORS
 from potto.source import Span
 from potto.syntax import nodes
-from potto.types import interface
 from potto.types.still import is_dual, lacks_tangents
 from potto.types.types import ArrayOf, SizeVar, Type, resolve
 
@@ -89,7 +88,7 @@ def call(elaboration: Elaboration, function: Value, given: Arguments, span: Span
                 elaboration.as_term(call(elaboration, orelse, given, span)),
             )  # fmt: skip
         case Global() | App() | Deriv() | Var() | Proj() | Index() | Lam():
-            groups = groups_of_term(elaboration.db, function)
+            groups = groups_of_term(elaboration.db, function, any(argument.name is not None for argument in given))
             if groups:
                 return _call_known(elaboration, function, groups, given, span)
             return _call_unknown(elaboration, function, given, span)
@@ -139,7 +138,8 @@ def _with_tangents(elaboration: Elaboration, function: Term, args: tuple[Term, .
     while isinstance(head, App):
         head = head.function
     if isinstance(head, Global):
-        if not interface(elaboration.db, head.module, head.name).derivative:
+        known = unnamed(elaboration.db, head.module, head.name)
+        if known is None or not known.derivative:
             return args
     elif not (isinstance(head, Deriv) and isinstance(head.function, Global)):
         return args

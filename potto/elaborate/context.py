@@ -162,7 +162,8 @@ class Elaboration:
         as many groups of parameters as its type says, and what it does with them can be seen in it."""
         from potto.elaborate.signatures import groups_of_term
 
-        groups = () if isinstance(term, Lam) else groups_of_term(self.db, term)
+        groups = () if isinstance(term, Lam) else groups_of_term(self.db, term, named=False)
+        groups = groups_of_term(self.db, term) if groups else ()
         own = [tuple(self.fresh(slot.name or "x") for slot in group) for group in groups]
         for names in own:
             term = app(term, tuple(map(var, names)))

@@ -18,7 +18,7 @@ from potto.modules.texts import definition
 from potto.query import Database, query
 from potto.source import Span
 from potto.syntax import nodes
-from potto.types import interface
+from potto.types import shape
 from potto.types.context import ensure_stack
 from potto.types.types import Type, groups_of
 
@@ -70,7 +70,7 @@ def core(db: Database, file: str, name: str) -> Elaborated:
     groups = tuple(tuple(parameter.name for parameter in group) for group in item.groups)
     if groups:
         closure = Closure(groups, item.bindings, item.body, EMPTY, annotated(item.groups))
-        types = [[p.type for p in group] for group in groups_of(interface(db, file, name).type)]
+        types = [[p.type for p in group] for group in groups_of(shape(db, file, name))]
         return _finished(elaboration, elaboration.function(closure, types))
     value = elaboration.term(item.body, elaboration.block(item.bindings, EMPTY))
     return _finished(elaboration, elaboration.whole(value) if _is_call(value) else value)

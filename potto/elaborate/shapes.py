@@ -1,15 +1,18 @@
 """What terms stand for, as far as it decides how they are put together: numbers, tuples, arrays.
 
-Owns `Shapes`. Types of definitions come from their interfaces, those of local names from what they were bound to, so
-that a term is all that has to be looked at; what is not known is a number.
+Owns `Shapes`. Types of definitions come from what `shape` says of them, those of local names from what they were bound
+to, so that a term is all that has to be looked at; what is not known is a number.
 """
 
 from __future__ import annotations
+
+from collections.abc import Callable
 
 from potto.core.terms import (
     App,
     Array,
     Branch,
+    Const,
     Deriv,
     Fold,
     Global,
@@ -18,6 +21,7 @@ from potto.core.terms import (
     Integral,
     Lam,
     ListOf,
+    Prim,
     Proj,
     Sum,
     Term,
@@ -27,9 +31,9 @@ from potto.core.terms import (
     transform,
     tuple_,
 )
-from potto.elaborate.signatures import signature
+from potto.elaborate.signatures import unnamed
 from potto.query import Database
-from potto.types import interface
+from potto.types import interface, shape
 from potto.types.still import makes_dual
 from potto.types.types import (
     ANY_SIZE,
@@ -47,22 +51,36 @@ from potto.types.types import (
 from potto.types.types import Var as TypeVar
 from potto.types.unify import as_tuple, open_type, parts, unify
 
+PLAIN = (Prim, Const)
+
 
 class Shapes:
-    """The types of the terms of one elaboration. names: of variables that stand for more than a number."""
+    """The types of the terms of one elaboration. names: of variables that stand for more than a number.
 
-    def __init__(self, db: Database) -> None:
-        self.db = db
+    definition: gives the type of a definition.
+    """
+
+    def __init__(self, db: Database, definition: Callable[[Database, str, str], Type] = shape) -> None:
+        self.db, self.definition = db, definition
         self.names: dict[str, Type] = {}
         self.known: dict[Term, Type] = {}
         self.meets_records = False  # whether some are made
 
     def of(self, term: Term) -> Type:
         """The type of a term; of what is no composite, a number."""
+        if isinstance(term, PLAIN):  # as most are
+            return REAL
         found = self.known.get(term)
         if found is None:
             found = self.known[term] = resolve(self._found(term))
         return found
+
+    def named(self, term: Term) -> Type:
+        """The same, where parameters of definitions have their names."""
+        shapes = Shapes(self.db, lambda db, file, name: interface(db, file, name).type)
+        shapes.names = self.names
+        shapes.known = {of: type for of, type in self.known.items() if not isinstance(type, Function)}
+        return shapes.of(term)
 
     def _found(self, term: Term) -> Type:
         match term:
@@ -95,7 +113,7 @@ class Shapes:
 
     def makes_record(self, function: Term) -> bool:
         """Whether a function is the definition of a record."""
-        found = signature(self.db, function.module, function.name) if isinstance(function, Global) else None
+        found = unnamed(self.db, function.module, function.name) if isinstance(function, Global) else None
         return found is not None and found.record
 
     def erased(self, term: Term, made: dict[Term, Term]) -> Term:
@@ -110,7 +128,7 @@ class Shapes:
         """The type of a call: that of the definition, for arguments like these."""
         match term:
             case Global(module=file, name=name):
-                type = interface(self.db, file, name).type
+                type = self.definition(self.db, file, name)
                 return open_type(type, 1) if any(isinstance(p, TypeVar) for p in _leaves(type)) else type
             case Deriv(function=function):
                 return derivative_type(self._called(function))

@@ -68,7 +68,7 @@ def _type_of(elaboration: Elaboration, value: Value) -> Type:
             locals = tuple((name, _type_of(elaboration, found)) for name, found in known if found is not None)
             return infer_expression(elaboration.db, elaboration.file, written, locals).type
         case _:
-            return elaboration.shapes.of(value)
+            return elaboration.shapes.named(value)
 
 
 def _lambda_of(closure: Closure) -> nodes.Expr:

@@ -16,6 +16,7 @@ from potto.types.queries import (
     infer_expression,
     interface,
     plain_reasons,
+    shape,
     typed_names,
 )
 from potto.types.types import (
@@ -60,5 +61,6 @@ __all__ = [
     "interface",
     "plain_reasons",
     "result_of",
+    "shape",
     "typed_names",
 ]

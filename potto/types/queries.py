@@ -30,7 +30,7 @@ from potto.types.lints import lints
 from potto.types.reasons import Reasons
 from potto.types.scope import Global, Local, Meaning, Member, Module, Outside
 from potto.types.types import Type
-from potto.types.unify import open_type
+from potto.types.unify import bare, open_type
 from potto.types.values import Port, Source, Value
 
 
@@ -47,6 +47,13 @@ def interface(db: Database, file: str, name: str) -> Interface:
     """What others may know of a definition: its type, and what flows where. Broken ones have one too."""
     found = _analysis(db, file, name)
     return unknown_interface(name) if found is None else found.interface
+
+
+@query(travels=True, cuts=True)
+def shape(db: Database, file: str, name: str) -> Type:
+    """The type of a definition as far as it decides what calls are made of: without the names of its parameters, and
+    without what varies with what. Most edits of a definition leave it as it is."""
+    return bare(interface(db, file, name).type)
 
 
 def check_definition(db: Database, file: str, name: str) -> tuple[Diagnostic, ...]:

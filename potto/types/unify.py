@@ -169,6 +169,18 @@ def parts(type: Type) -> tuple[Type, ...]:
     return (type.base,) if isinstance(type, Shifted) else ()
 
 
+def bare(type: Type) -> Type:
+    """A type without the names of parameters and without what it says of variation."""
+    if isinstance(type, NUMBERS):
+        return REAL
+    type = resolve(type)
+    if isinstance(type, Function):
+        return Function(tuple([Parameter(None, bare(p.type)) for p in type.parameters]), bare(type.result))
+    if isinstance(type, TupleOf):
+        return with_items(type, tuple([bare(item) for item in type.items]))
+    return ArrayOf(type.size, bare(type.item)) if isinstance(type, ArrayOf) else type
+
+
 def rebuild(type: Type, leaf: Callable[[Type], Type]) -> Type:
     """A type with every part that is no composite replaced by `leaf` of it."""
     if isinstance(type, Real):  # most parts

@@ -192,6 +192,9 @@ class _Place(Struct, frozen=True):
     names: Mapping[str, Term] = {}
 
 
+_BODIES = (Lam, Sum, Array, Fold)
+
+
 class _Walk:
     def __init__(self, skeletons: Resolve, whole: Resolve) -> None:
         self.skeletons = skeletons
@@ -207,7 +210,7 @@ class _Walk:
         nodes = postorder(term)
         self.taken |= term.free
         for node in nodes:
-            if isinstance(node, Lam | Sum | Array | Fold):
+            if isinstance(node, _BODIES):
                 self.taken |= node.body.free
             elif isinstance(node, Integral):
                 self.taken.update(node.variables)

@@ -204,7 +204,8 @@ def _products(
         if not isinstance(node, Integral):
             continue
         parts = postorder(node.body)
-        anchors = [c.anchor for c in found if c.delta and (c.anchor in parts)]
+        deltas = [c.anchor for c in found if c.delta]
+        anchors = [anchor for anchor in deltas if anchor in parts]
         anchors += [p for p in parts if isinstance(p, App) and isinstance(spine(p)[0], Deriv)]
         if not anchors:
             continue

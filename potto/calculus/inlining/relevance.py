@@ -9,7 +9,7 @@ from potto.modules import chunk_text, references
 from potto.modules.graph import refer
 from potto.modules.lookup import DefinitionTarget
 from potto.query import Database
-from potto.types import interface
+from potto.types import shape
 from potto.types.types import ArrayOf, Dist, Function, Real, Truth, TupleOf, Type
 
 _INTEGRALS = ("integral", "∫")
@@ -23,7 +23,7 @@ def may_integrate(db: Database, file: str, name: str) -> bool:
     if text is None or any(word in text for word in _INTEGRALS):
         return True
     targets = {refer(db, file, path, used) for path, used in references(db, file, name)}
-    found = (interface(db, target.file, target.name).type for target in targets if isinstance(target, DefinitionTarget))
+    found = (shape(db, target.file, target.name) for target in targets if isinstance(target, DefinitionTarget))
     return not all(map(_takes_numbers, found))
 
 
