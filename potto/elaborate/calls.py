@@ -58,7 +58,7 @@ def _apply(elaboration: Elaboration, node: nodes.Apply, scope: Scope) -> Value:
     function = elaboration.value(node.function, scope)
     if isinstance(function, Builtin) and function.name in DERIVATIVES and node.arguments:
         return slope(elaboration, function.name, node, elaboration.value(node.arguments[0].value, scope))
-    given = [Given(argument.name, elaboration.value(argument.value, scope)) for argument in node.arguments]
+    given: list[Given[Value]] = [Given(a.name, elaboration.value(a.value, scope)) for a in node.arguments]
     return call(elaboration, function, given, node.span)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pytest
 from snippets import elaborated, program, shown, term
 
 from potto.core.terms import (
@@ -135,6 +136,30 @@ def test_a_body_edit_of_a_callee_elaborates_no_caller_again():
     with db.recording() as events:
         core_term(db, "<text>", "f")
     assert not [e for e in events if e.kind == "executed" and e.query == "core" and e.args[1] == "f"]
+
+
+@pytest.mark.parametrize(
+    "edited, runs",
+    [
+        ("def g(c, d) [c < d]*c", False),  # other names, and something jumps
+        ("def g(a: (Real, Real), b) a.x*b", True),
+        ("def g(a, b, c) a*b*c", True),
+    ],
+)
+def test_a_term_rests_on_the_shapes_of_what_it_calls(edited, runs):
+    db = program("def g(a, b) a*b\ndef f(x) g(x, 2) + integral [0, 1] g(x, y) d(y)")
+    core_term(db, "<text>", "f")
+    db.set_input(("overlay", "<text>"), edited + "\ndef f(x) g(x, 2) + integral [0, 1] g(x, y) d(y)")
+    with db.recording() as events:
+        core_term(db, "<text>", "f")
+    assert bool([e for e in events if e.kind == "executed" and e.query == "core" and e.args[1] == "f"]) == runs
+
+
+def test_a_call_with_keywords_follows_the_names_of_parameters():
+    db = program("def g(a, b) a - b\ndef f(x) g(b=x, 2)")
+    assert core_term(db, "<text>", "f") is term("def g(a, b) a - b\ndef f(x) g(2, x)")
+    db.set_input(("overlay", "<text>"), "def g(b, a) b - a\ndef f(x) g(b=x, 2)")
+    assert core_term(db, "<text>", "f") is term("def g(b, a) b - a\ndef f(x) g(x, 2)")
 
 
 def test_expressions_with_locals():
