@@ -164,7 +164,9 @@ def _sum(stop: Stop) -> Diagnostic | None:
         several = hint == SEVERAL and stop.at.kind == "SUM"
         return kinds.UNEXPECTED(opening.span, "what goes through an array has one name", help=hint) if several else None
     message = "the variable of a `sum` stands without parentheses, its terms stand in them"
-    return kinds.UNEXPECTED(opening.span, message, help="write `sum i in 1..n (body)`")
+    whole = _OF_ARRAY.match(stop.text, opening.start)
+    help = "write `sum i in 1..n (body)`" if whole is None else f"write `sum x in {whole[1]} (x)`"
+    return kinds.UNEXPECTED(opening.span, message, help=help)
 
 
 def _array(stop: Stop) -> Diagnostic | None:

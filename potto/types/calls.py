@@ -24,7 +24,7 @@ from potto.types.context import Inference, Plan, rule
 from potto.types.forms import delta, deriv
 from potto.types.infer import is_known, special
 from potto.types.loading import loaded
-from potto.types.mismatches import BY_PARTS, between, comparison, describe, mismatch, no_field, sized_by
+from potto.types.mismatches import BY_PARTS, between, comparison, describe, mismatch, no_field, of_one, sized_by
 from potto.types.motionless import check_tangents, takes_duals
 from potto.types.scope import Builtin
 from potto.types.slopes import slope
@@ -316,7 +316,7 @@ class _Filling:
             at if at.end <= end else self.node.span,
             f"{callee_name(self.node)} needs {what}",
             label="not enough",
-            help=self._signature(),
+            help=self._signature() or of_one(self.node),
         )
 
     def _signature(self) -> str:

@@ -310,3 +310,12 @@ def between(whole: Span, inner: Span, before: str, after: str, title: str) -> Su
     """Other brackets around what stands within a place."""
     left, right = Span(whole.start, inner.start), Span(inner.end, whole.end)
     return Suggestion(title, (Replacement(left, before), Replacement(right, after)))
+
+
+def of_one(node: nodes.Apply) -> str:
+    """What to write where the greatest or the least of one thing is asked for: of an array that is."""
+    name, of = getattr(node.function, "id", ""), node.arguments
+    if name not in ("max", "min") or len(of) != 1:
+        return ""
+    extreme = "greatest" if name == "max" else "least"
+    return f"the {extreme} element of an array is `{name} x in {getattr(of[0].value, 'id', 'xs')} (x)`"

@@ -19,6 +19,7 @@ from marks import only
         ("def f(x) x(x + 1)", "to multiply, write `*`"),
         ("def f(x, y) x(y)\ndef g(x) f(x + 1, x)", "it is applied there, as a function; if a product is meant, write"),
         ("xs = [1, 2]\nxs(0)", "an element of an array is written with brackets: `xs[i]`"),
+        ("xs = [1, 2]\na = max(xs)", "the greatest element of an array is `max x in xs (x)`"),
         ("def f(c) integral ([0, 1], [0, 1]) ((x + c, y) ? 1 : 0) d(x, y)", "write `diffeo(…)` for a diffeomorphism"),
         ("def f(t) if t then 1 else 0\ndef g(x) f(x + 1)", "it decides a condition there; a number is compared first"),
         ("def f(t) integral [0, 1] (x < t) d(x)", "put it in brackets, `[x < t]`, for 1 where it holds"),
