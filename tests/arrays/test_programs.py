@@ -145,6 +145,14 @@ def called(t) whole_of(\x . [x, t*x])
     assert (mean, square, third) == pytest.approx((2, 6, 6), rel=1e-9)  # to where the sum over whole numbers is cut
 
 
+@pytest.mark.parametrize("xs", [[1.0, 1.0], [1.0, 1.0, 2.0, 2.0]])
+def test_gradients_at_ties_have_the_shape_of_the_array(xs: list[float]) -> None:
+    """Each of the greatest is, to one side: either 0 or 1; those below are 0 to both."""
+    found = potto.grad(M.greatest)(xs).tangent
+    assert found.shape == (len(xs),)
+    assert all(slope == 0 or (slope == 1 and x == max(xs)) for slope, x in zip(found, xs))
+
+
 def test_gradients_of_lambdas_whose_parameters_have_types() -> None:
     module = potto.compile(r"""
 record P(x: Real, y: Real)

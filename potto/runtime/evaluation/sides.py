@@ -6,7 +6,7 @@ what differs in a part may be the same in the whole, as at t = 1 of abs(t - 1)^3
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
 import numpy as np
@@ -15,7 +15,7 @@ from potto.calculus.surfaces.trace import spine
 from potto.core.terms import App, Hole, If, Integral, Lam, Term, postorder
 from potto.diagnostics import PottoError
 from potto.integrate.events import OneSidedDerivatives, TwoSided
-from potto.kernels.cells import Array, Cell, Number, Value, all_cells, map_cells, pad
+from potto.kernels.cells import Array, Cell, Number, Rows, Value, all_cells, map_cells, pad
 from potto.runtime.evaluation.beside import SAME as ALIKE
 from potto.runtime.evaluation.beside import Parts, approached, moved, one_direction, parameter_step
 from potto.runtime.evaluation.linker import Linker
@@ -120,7 +120,19 @@ def _led_to(machine: Machine, given: Value, run: Run, here: Parts, side: int) ->
 
 def _batch(given: Value) -> tuple[int, ...]:
     """The shape of all that is evaluated at once; what is the same for all of it may have none."""
-    return np.broadcast_shapes(*(np.shape(x) for cell in all_cells(given) for x in (cell.v, *cell.t) if x is not None))
+    return np.broadcast_shapes(*_shapes(given, 0))
+
+
+def _shapes(given: Value, inside: int) -> Iterator[tuple[int, ...]]:
+    """The shapes of numbers, without the last axes, those of the arrays that they are in."""
+    if isinstance(given, Rows):
+        yield from _shapes(given.item, inside + 1)
+    elif isinstance(given, tuple | list):
+        for item in given:
+            yield from _shapes(item, inside)
+    elif isinstance(given, Cell):
+        for shape in (np.shape(x) for x in (given.v, *given.t) if x is not None):
+            yield shape[: max(len(shape) - inside, 0)]
 
 
 def _numbers(value: Value, directions: int, batch: tuple[int, ...]) -> Parts:
