@@ -73,7 +73,7 @@ def test_what_never_holds_is_not_shown_and_roots_of_decimals_are_decimals() -> N
     [
         ("x + 2*y < t", "[x < t and t < x + 2]"),
         ("x^2 + y^2 < t^2", "[x^2 < t^2 and t^2 < x^2 + 1]"),
-        ("x + y + t >= 0", "[t + x < 0 and t + x > -1]"),
+        ("x + y + t >= 0", "[t + x > -1 and t + x < 0]"),
     ],
 )
 def test_what_has_two_bounds_stands_between_them(condition: str, read: str) -> None:
@@ -87,14 +87,21 @@ def test_what_has_two_bounds_stands_between_them(condition: str, read: str) -> N
     ("program", "read"),
     [
         ("def f(t) integral ([0, 1], [0, 1]) [x*y < t] d(x, y)", "dt/x*[t > 0 and t < x]"),
-        ("def f(t) integral [0, 1] (integral [0, x] [y < t*x]*y d(y)) d(x)", "t*x^2*dt*[t > 0 and t < 1]"),
-        ("def f(t) integral [-1, 0] (integral [x, 0] [y < t*x] d(y)) d(x)", "x*dt*[t < 1 and t > 0]"),
+        ("def f(t) integral ([0, 1], [0, 1]) [x*(y - t) < 0] d(x, y)", "dt*[t > 0 and t < 1]"),
+        ("def f(t) integral ([-1, 0], [0, 1]) [x*y > t] d(x, y)", "dt/x*[t < 0 and x < t]"),
     ],
 )
 def test_factors_whose_sign_is_known_inside_an_integral_are_left_out(program: str, read: str) -> None:
     library = Library()
     file = library.put("<text>", program + "\n")
     assert read in explain_derivative(library.db, file, "f").tangent
+
+
+def test_a_sign_that_conditions_tell_is_not_written() -> None:
+    """The edges of abs(x - 1/2) < a move apart; that there are two is asked of a, and so is the sign of each slope."""
+    library = Library()
+    file = library.put("<text>", "def f(a) integral [0, 1] [abs(x - 1/2) < a]*x d(x)\n")
+    assert explain_derivative(library.db, file, "f").tangent == "da*[a > 0 and a < 0.5]"
 
 
 def test_a_root_of_a_product_is_one_of_squares() -> None:

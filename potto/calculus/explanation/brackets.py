@@ -1,8 +1,8 @@
 """Iverson brackets as conditions, in as few and as plain comparisons as they can be told.
 
-Owns `Condition`, `conditions`, `fewer`, `between`, `plainer` and `bracket`. A root is compared by squares, factors that
-do not change a sign are left out, and so is what another condition implies. What two conditions hold between numbers
-stands between them: `-1 < c + x < 0` is c < -x and c + x + 1 > 0.
+Owns `Condition`, `conditions`, `fewer`, `between`, `plainer`, `sign_where` and `bracket`. A root is compared by
+squares, factors that do not change a sign are left out, and so is what another condition implies. What two conditions
+hold between numbers stands between them: `-1 < c + x < 0` is c < -x and c + x + 1 > 0.
 """
 
 from __future__ import annotations
@@ -97,20 +97,20 @@ class _Bound(Struct, frozen=True):
 
 
 def between(known: Sequence[Condition]) -> list[Condition]:
-    """The same conditions: two bounds of one thing beside each other and alike, so that it stands between them, and no
-    fraction of anything."""
+    """The same conditions: two bounds of one thing alike and beside each other, so that it stands between them, the
+    lower one last, which is asked first; and none of a fraction of anything."""
     bounds = [_bound(item.surface) for item in known]
     found: list[Condition] = []
     done: set[int] = set()
     for i, bound in enumerate(bounds):
-        both = (
-            [] if bound is None else [j for j, other in enumerate(bounds) if other is not None and other.of == bound.of]
-        )
-        for j in () if i in done else sorted({i, *both}):
-            done.add(j)
-            other = bounds[j]
-            surface = None if other is None or (len(both) == 1 and not other.scaled) else _surface(other)
+        if i in done:
+            continue
+        alike = [(j, b) for j, b in enumerate(bounds) if b and bound and b.of == bound.of]
+        surfaces = {j: _surface(b) for j, b in alike if b.scaled or len(alike) > 1}
+        for j in [j for j, b in alike if b.turned] + [j for j, b in alike if not b.turned] or [i]:
+            surface = surfaces.get(j)
             found.append(known[j] if surface is None else Condition(surface, known[j].strict))
+            done.add(j)
     return found
 
 
@@ -158,11 +158,22 @@ def plainer(surface: Term, box: Mapping[str, tuple[float, float]]) -> Term | Non
                 left[atom] = n
                 turned ^= bool(n % 2) and bounds.lo < 0
         parts.append({without(m, left): c for m, c in form.items()} if left else form)
-    top, below = map(as_term, parts)
+    top, below = as_term({m: -c for m, c in parts[0].items()} if turned else parts[0]), as_term(parts[1])
     if top is None or below is None or (parts[0] is found.top and parts[1] is found.below):
         return None
-    whole = top if below is ONE else div(top, below)
-    return neg(whole) if turned else whole
+    return top if below is ONE else div(top, below)
+
+
+def sign_where(known: Sequence[Condition], inner: Term) -> tuple[int, list[Condition]] | None:
+    """The sign of `inner` where the conditions hold, if they tell it, and the conditions without the places where it is
+    0: sign(a)*[a >= 0] is [a > 0]."""
+    for i, item in enumerate(known):
+        for turned, signed in ((1, inner), (-1, neg(inner))):
+            positive, strict = Condition(signed, True), Condition(item.surface, True)
+            if _implies(strict, positive):
+                own = item if _implies(item, positive) else strict
+                return turned, [*known[:i], own, *known[i + 1 :]]
+    return None
 
 
 def opposite(first: Condition, second: Condition) -> bool:

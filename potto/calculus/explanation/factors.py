@@ -12,13 +12,14 @@ from fractions import Fraction
 from msgspec import Struct
 
 from potto.calculus.algebra.ranges import range_of
-from potto.calculus.explanation.brackets import NEVER, Condition, bracket, conditions, fewer
+from potto.calculus.explanation.brackets import NEVER, Condition, bracket, conditions, fewer, sign_where
 from potto.core.polynomials import number
 from potto.core.printer import format_term
 from potto.core.terms import (
     ONE,
     ZERO,
     App,
+    Branch,
     Const,
     Delta,
     Index,
@@ -130,11 +131,21 @@ def _tidied(known: Factors) -> Factors:
 
 
 def _signed(found: Factors, sign: Prim) -> None:
-    """sign(v) v is abs(v), and the square of a sign is 1."""
+    """sign(v) v is abs(v), the square of a sign is 1, and so is a sign that the conditions tell."""
     (inner,) = sign.args
     odd = found.powers.pop(sign).numerator % 2
     own = found.powers.get(inner, Fraction(0))
     if not odd:
+        return
+    match inner:
+        case Branch(coordinates=(surface,), then=Const(value=a), orelse=Const(value=b)) if a * b < 0:
+            inner = surface
+            found.coefficient *= 1 if a > b else -1
+            sign = prim("sign", inner)
+    told = sign_where(found.conditions, inner)
+    if told is not None:
+        found.coefficient *= told[0]
+        found.conditions = told[1]
         return
     if not own or own.denominator != 1:
         found.powers[sign] = Fraction(1)
