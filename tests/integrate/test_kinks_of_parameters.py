@@ -258,3 +258,16 @@ def test_no_surface_lies_along_an_infinite_bound(source: str) -> None:
     f = potto.deriv(potto.compile(f"def f(t) {source}").f)
     with potto.settings(method="mc", samples=10_000):
         assert f((0.6, 1.0)).evals <= 1.05 * 10_000
+
+
+@pytest.mark.parametrize("surface", [
+    "x - x", "x*t - t*x", "(x + 1)^2 - x^2 - 2*x - 1", "sin(x)^2 + cos(x)^2 - 1", "max(x, 2*x) - 2*x",
+])  # fmt: skip
+def test_a_surface_that_does_not_vary_lies_all_along(surface: str) -> None:
+    """The integral is that of [0 < t], however its surface is written: 0 below t = 0 and 1 above."""
+    program = f"integral [0, 1] [{surface} < t] d(x)"
+    (note,) = rate(program, 0.0).notes
+    assert note.along and (note.backward, note.forward) == (0.0, math.inf)
+    f = potto.compile(f"def f(t) {program}\n").f
+    assert (f(-0.5).value, f(0.5).value) == (0.0, 1.0)
+    assert abs(potto.hessian(f)(0.5).value) <= 1e-15

@@ -3,6 +3,7 @@
 Owns `cased`, `by_extremes`, `unnested` and `resolved`. The surface of `[max(x, y) < t]` runs along x and along y, so
 that no variable of integration cuts all of it; those of `[x < t]*[y < t]` do, which is the same. Where a condition does
 not rise or fall with what is the greatest or the least, a condition that has no jump of its own chooses between cases.
+Conditions that cancel go with it, as those of cases do: [max(x, 2*x) - 2*x < t] where 2*x is the greater.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from collections.abc import Callable, Sequence
 
 from potto.calculus.algebra.ranges import positive
 from potto.calculus.solving.solve import shared_factors
+from potto.calculus.surfaces.cancelled import without_cancelled
 from potto.calculus.surfaces.nested_brackets import has_nested
 from potto.core.terms import (
     Branch,
@@ -46,13 +48,16 @@ def by_extremes(term: Integral) -> Integral:
 
 
 def _changed(term: Integral, change: Callable[[Branch], Term]) -> Integral:
-    if not any(isinstance(node, Branch) and _bent(node) for node in postorder(term.body)):
+    if not any(isinstance(node, Branch) for node in postorder(term.body)):
         return term
 
     def changed(_: Term, new: Term) -> Term:
         return change(new) if isinstance(new, Branch) and _bent(new) else new
 
-    return with_integrand(term, transform(term.body, changed))
+    def plain(_: Term, new: Term) -> Term:
+        return without_cancelled(new, term.variables) if isinstance(new, Branch) else new
+
+    return with_integrand(term, transform(transform(term.body, changed), plain))
 
 
 def resolved(term: Term) -> Term:

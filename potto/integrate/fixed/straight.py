@@ -108,7 +108,10 @@ def straight(term: Integral, body: Term, levels: Sequence[LevelPlan]) -> Straigh
         return None
     surfaces = tuple(dict.fromkeys(node.surface for node in nodes if isinstance(node, Branch)))
     cuts = [cut for level in levels for cut in children(level.frame.body)]
-    choices = tuple({choice: None for cut in cuts for node in postorder(cut) if (choice := _choice(node, term))})
+    # What the program chooses by may have two derivatives at an edge. The formulas of a root go over into each other.
+    written = {*postorder(term), *nodes}
+    solved = (node for cut in cuts for node in postorder(cut) if node not in written)
+    choices = tuple({choice: None for node in solved if (choice := _choice(node, term))})
     either = _chosen(tuple_(cuts), dict.fromkeys(choices))
     if len(choices) > MOST_CHOICES or not all(map(enclosable, (*surfaces, _all_sides(body), *children(either)))):
         return None
