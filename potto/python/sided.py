@@ -2,7 +2,7 @@
 
 Owns `with_sides`. A tape has one slope for each number. Which of two counts depends on the way in which a parameter
 moves the number that is at a kink, and that is another for each parameter: so by those that move one it is
-differentiated forward, a few at a time. By all others the tape is right.
+differentiated forward, a few at a time, if they are few. By all others the tape is right.
 """
 
 from __future__ import annotations
@@ -21,18 +21,25 @@ from potto.runtime.answers.convergence import merged
 from potto.runtime.evaluation.record import Record
 
 BLOCK = 32  # directions at once: a forward run costs 1.6 values with 4 of them, and with 64 up to 4.8
+MOST = 32  # parameters that move what has two: with more of them a gradient would cost by their number
 
 Direction = tuple[int, tuple[int, ...]]  # a number of the parameters: whose seed it has, and its place in arrays
 Forward = Callable[[dict[str, Value], int], tuple[Value, Record]]  # by parameters that move in so many directions
 
 
 def with_sides(found: Value, record: Record, given: dict[str, Value], seeds: Sequence[Node], forward: Forward) -> Value:
-    """What a tape has found, with the derivatives by what moves one that has two put right, and both of them noted."""
+    """What a tape has found, with the derivatives by what moves one that has two put right, and both of them noted.
+
+    Where more than `MOST` parameters do, the tape's: each is a derivative of every part to one of its sides, and notes
+    are those of parts.
+    """
     directions = list(_directions(given.values()))
     number = {direction: i for i, direction in enumerate(directions)}
     marked = reached(record.taped)
     marks = [_over_members(marked.get(seed, False), seed, directions, k) for k, seed in enumerate(seeds)]
     touched = [(k, place) for k, place in directions if marks[k][place]] or directions
+    if len(touched) > MOST:
+        return found
     cells = {i: _Slopes(cell, seeds) for i, cell in enumerate(all_cells(found)) if cell.t}
     if len(touched) == len(directions):
         record.shortfalls = {}  # what the tape lacked is found anew
