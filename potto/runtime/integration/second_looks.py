@@ -37,9 +37,12 @@ def by_less(problem: Problem, order: Integral, sums: Sums) -> Sums:
 
     Refinement that runs out of evaluations has spent them where it then stood, and left the rest as it was. Asked for
     less accuracy it does reach the end, at a small part of the cost. So asking for more never gives less.
-    Not where the integrand calls for integrals, or has so many cuts, that it would go far beyond any budget once more.
+    Not where the integrand calls for integrals, or has so many cuts, that it would go far beyond any budget once more;
+    and not where it is not known what to cut at, of which a second time knows no more.
     """
     machine, plan = problem.machine, problem.plan(order)
+    if plan.confused or (machine.directions and not plan.reaches):
+        return sums
     if not machine.exhausted() or machine.overdrawn() or uncertainty(sums) <= ENOUGH or machine.inexact(plan.term.body):
         return sums
     for rtol in TOLERANCES:
