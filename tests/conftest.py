@@ -8,6 +8,8 @@ Some hundred tests start Python: what it compiles is kept, also where the enviro
 would compile all of Potto again.
 
 What is kept between runs is kept in a folder of this run alone: no test is answered by an earlier one's cache.
+
+The longest tests go first: at the end one process would go through them while the others wait.
 """
 
 import os
@@ -15,6 +17,7 @@ import signal
 import sys
 import tempfile
 
+import pytest
 from hypothesis import settings
 
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
@@ -29,3 +32,9 @@ os.environ["POTTO_CACHE"] = _cache.name
 settings.register_profile("repeatable", derandomize=True, deadline=None, max_examples=25)
 settings.register_profile("explore", deadline=None, max_examples=200)
 settings.load_profile("repeatable")
+
+LONGEST = {"worlds", "catalogue", "integrate"}  # folders
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    items.sort(key=lambda item: LONGEST.isdisjoint(item.path.parts))
