@@ -83,6 +83,11 @@ def second(x, y)(c) exp(-x*y)*(c + 2)
 
 
 def test_pixels_of_a_shader_given_take_the_short_way_as_those_of_one_written_out() -> None:
+    with potto.settings(backend="numpy"):  # machine code takes over by the clock, and is looked at in other ways
+        _take_the_short_way()
+
+
+def _take_the_short_way() -> None:
     kernels.clear()
     m, (u, v) = potto.compile(PIXELS), np.meshgrid(np.arange(16) / 16, np.arange(16) / 16)
     whole = potto.deriv(m.inlined)((u, 0.0), (v, 0.0), (-0.7, 1.0))

@@ -310,9 +310,7 @@ def settled(plan: Straight, machine: Evaluator, env: dict[str, Value]) -> Settle
     return Settled(plan, region, machine, box, _truncation(plan, region, machine.directions, env), faces or [], awaited)
 
 
-def _decided(
-    plan: Straight, machine: Evaluator, env: dict[str, Value]
-) -> tuple[Straight, dict[str, float] | None]:  # fmt: skip
+def _decided(plan: Straight, machine: Evaluator, env: dict[str, Value]) -> tuple[Straight, dict[str, float] | None]:
     """The plan as these parameters decide its choices, and the parameters, if each is one finite number."""
     values = _numbers(plan, env)
     if values is not None and plan.choices is not None:

@@ -38,7 +38,7 @@ ROUNDED = 1e-12
 
 def by_shapes(
     plan: Straight, degrees: Sequence[int | None], machine: Evaluator, env: dict[str, Value], batch: int
-) -> tuple[Bools, Sums] | None:  # fmt: skip
+) -> tuple[Bools, Sums] | None:
     """Which members were integrated here, and the sums of all (zero for the others); None if none were: those for which
     cuts have the same formulas together.
 
