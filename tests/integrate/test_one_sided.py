@@ -110,6 +110,19 @@ def test_members_of_a_batch_have_sides_of_their_own() -> None:
     assert len(answer.notes) == 1
 
 
+def test_only_members_that_meet_something_are_looked_at_on_both_sides() -> None:
+    """Twice what two integrals come to, 2*t*(1 + exp(t) - 1) within 0 < t < 1; the others are evaluated once."""
+    f = potto.compile("def f(t) 2*(integral [0, 1] [x < t] d(x))*(integral [0, 1] [x < t]*exp(x) d(x) + 1)").f
+    t = np.linspace(0.0, 1.0, 201)[1:-1]
+    plain, met = (potto.deriv(f)((at, np.ones_like(at))) for at in (t, np.append(t, 0.0)))
+    assert met.evals < plain.evals + 100  # 6,400 more where all are
+    assert np.array_equal(met.tangent[:-1], plain.tangent)
+    assert met.tangent[:-1] == pytest.approx(2 * np.exp(t) * (1 + t), rel=1e-11)  # what is asked for is 1e-10
+    (note,) = met.notes
+    assert np.isnan(note.backward[..., :-1]).all() and np.isnan(note.forward[..., :-1]).all()
+    assert (note.backward[..., -1], note.forward[..., -1]) == (0.0, pytest.approx(2.0, rel=1e-11))
+
+
 def test_a_surface_that_turns_off_a_bound() -> None:
     """t*y > x takes the triangle t/2 away for t > 0, and nothing for t < 0; at 0 it runs along the whole bound."""
     (note,) = rate("integral ([0, 1], [0, 1]) [x - t*y > 0] d(x, y)").notes

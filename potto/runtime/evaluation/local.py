@@ -15,7 +15,6 @@ import numpy as np
 from potto.kernels.cells import Cell, Number, Value, all_cells, map_cells, pad
 from potto.kernels.tape import Node, every_leaf, leaves, linear, pushed
 from potto.runtime.evaluation.machine import Machine
-from potto.runtime.evaluation.record import Record
 
 Env = dict[str, Value]
 Run = Callable[[Machine, Env], Value]
@@ -60,19 +59,9 @@ def _off_the_tape(machine: Machine, env: Env, moving: Sequence[Cell], run: Run) 
     tangents = {id(cell): (row[0], row[1]) for cell, row in zip(moving, pushes, strict=True)}
     met = machine.record.met, len(machine.record.edges)
     value = run(machine.with_directions(len(order)), _with_tangents(env, tangents, len(order)))
-    here = _sided(machine.record, *met)
+    here = machine.record.sided(*met)
     machine.record.taped += [(node, here) for node in order if np.any(here)]
     return map_cells(value, lambda cell: _taped(cell, order))
-
-
-def _sided(record: Record, met: int, known: int) -> Any:
-    """Which members have met something with two derivatives since so much was known: all, where that is not told."""
-    edges = record.edges[known:]
-    if record.met == met:
-        return False
-    if record.met - met > len(edges) or any(edge.cause.jump for edge in edges):
-        return True
-    return np.any(np.broadcast_arrays(*(np.any(~np.isnan(edge.backward), axis=0) for edge in edges)), axis=0)
 
 
 def _by_each(machine: Machine, env: Env, moving: Sequence[Cell], run: Run) -> Value | None:

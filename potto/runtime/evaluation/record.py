@@ -159,6 +159,17 @@ class Record(Struct):
         self.met += known
         return known
 
+    def sided(self, met: int, known: int) -> Any:
+        """Which members have met something with two derivatives since `met` and this many edges: all, where that is
+        not told."""
+        edges = self.edges[known:]
+        if self.met == met:
+            return False
+        if self.met - met > len(edges) or any(edge.cause.jump for edge in edges):
+            return True
+        told = (np.any(~np.isnan(side), axis=0) for edge in edges for side in edge.sides)
+        return np.any(np.broadcast_arrays(*told), axis=0)
+
     def tell(self, events: Events, batch: int, shape: tuple[int, ...]) -> None:
         """Add what the integrals of a whole batch have met to what the answer says, in the batch's shape."""
         for why, members in events.every(Shortfall):

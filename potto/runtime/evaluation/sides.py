@@ -7,6 +7,7 @@ what differs in a part may be the same in the whole, as at t = 1 of abs(t - 1)^3
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import nullcontext
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,19 @@ from potto.calculus.surfaces.trace import spine
 from potto.core.terms import App, Hole, If, Integral, Lam, Term, postorder
 from potto.diagnostics import PottoError
 from potto.integrate.events import OneSidedDerivatives, TwoSided
-from potto.kernels.cells import Array, Cell, Number, Rows, Value, all_cells, map_cells, pad
+from potto.kernels.cells import (
+    Array,
+    Bools,
+    Cell,
+    Ints,
+    Number,
+    Rows,
+    Value,
+    all_cells,
+    map_arrays,
+    map_cells,
+    pad,
+)
 from potto.runtime.evaluation.beside import SAME as ALIKE
 from potto.runtime.evaluation.beside import Parts, approached, moved, one_direction, parameter_step
 from potto.runtime.evaluation.linker import Linker
@@ -23,6 +36,8 @@ from potto.runtime.evaluation.machine import Machine
 
 DEEPEST = 20  # definitions that a call may lead through
 Run = Callable[[Machine, Value], Value]
+Side = tuple[Array, Array]  # the tangents of all numbers, (numbers, directions, …), and how far off they may be
+Sides = tuple[Side, Side]
 SAME = 1e-12  # how far apart the derivatives on both sides may be beside their errors, as a part of them
 
 
@@ -32,36 +47,68 @@ def as_a_whole(machine: Machine, term: Term, given: Value, run: Run) -> Value:
     derivative, else the nearer one is, and a note tells them.
     """
     record = machine.record
-    known = len(record.edges)
+    before = record.met, len(record.edges)
     value = run(machine, given)
-    met = record.edges[known:]
+    met = record.edges[before[1] :]
     within = all(edge.cause.variable for edge in met)  # what an integral has met, none of the numbers that it is given
     if not met or machine.side or machine.taping or (within and _one_integral(machine.linker, term)):
         return value
-    kept = dict(record.shortfalls), record.edges[:known], record.within
-    value = pad(value, machine.directions)
-    jumps = [edge for edge in met if edge.cause.jump]
-    batch = _batch(given)
+    value, batch = pad(value, machine.directions), _batch(given)
+    members = _few(record.sided(*before), batch)
+    there: Any = (...,) if members is None else (..., members)
+    v, e, slopes, off = _numbers(value, machine.directions, batch)
+    here = v[there], e[there], slopes[there], off[there]
+    jumps = any(edge.cause.jump for edge in met)
+    del record.edges[before[1] :]  # what is noted is told of the whole
     try:
-        if jumps:
-            sides = [_led_to(machine, given, run, _numbers(value, machine.directions, batch), side) for side in (-1, 1)]
-        else:
-            sides = [
-                _numbers(run(machine.apart().changed(side=side), given), machine.directions, batch)[2:]
-                for side in (-1, 1)
-            ]
+        sides = _both(machine, given, members, lambda m, own, side: _beside(m, own, side, run, here, jumps))
     except PottoError:  # a number that counts something: beside it there is nothing
         return value
+    slopes, off = slopes.copy(), off.copy()
+    slopes[there], off[there], two = _chosen(here, sides, jumps)
+    if two is not None:
+        record.edges.append(_note(met[0].cause, two, slopes.shape, there, sides))
+    rows = iter(zip(slopes, off, strict=True))
+    return map_cells(value, lambda cell: Cell(cell.v, cell.e, *map(tuple, next(rows))))
+
+
+def _few(met: Any, batch: tuple[int, ...]) -> Ints | None:
+    """The members of a batch that have met something; None where that is told of all together."""
+    return np.nonzero(met)[0] if len(batch) == 1 and np.shape(met) == batch else None
+
+
+def _both(machine: Machine, given: Value, members: Ints | None, beside: Callable[[Machine, Value, int], Side]) -> Sides:
+    """What `beside` finds on either side for some members by themselves. The record is left as it was."""
+    record = machine.record
+    kept = record.shortfalls, record.edges, record.within
+    try:
+        with nullcontext(machine.apart()) if members is None else machine.among(members) as apart:
+            given = given if members is None else map_arrays(given, lambda a: a[members])
+            sides = []
+            for side in (-1, 1):
+                record.shortfalls, record.edges, record.within = {}, [], 0.0
+                sides.append(beside(apart, given, side))
     finally:
         record.shortfalls, record.edges, record.within = kept
-    (backward, before), (forward, beyond) = sides
+    return sides[0], sides[1]
+
+
+def _beside(machine: Machine, given: Value, side: int, run: Run, here: Parts, jumps: bool) -> Side:
+    """The tangents to a side, and how far off they may be: as that side has them, or where something jumps, as the
+    values there lead to them."""
+    if jumps:
+        return _led_to(machine, given, run, here, side)
+    value = run(machine.apart().changed(side=side), given)
+    return _numbers(value, machine.directions, _batch(given))[2:]
+
+
+def _chosen(here: Parts, sides: Sides, jumps: bool) -> tuple[Array, Array, Bools | None]:
+    """The tangents and how far off they may be: that of both sides where these are the same, else the nearer one. And
+    where all of them are the same, if there are two anywhere."""
+    (backward, before), (forward, beyond), (_, _, slopes, off) = *sides, here
     with np.errstate(invalid="ignore"):
         near = np.abs(forward - backward) <= SAME * (np.abs(forward) + np.abs(backward)) + before + beyond
         same = np.where(np.isfinite(forward) & np.isfinite(backward), near, forward == backward)
-        if not same.all():
-            where = same.all(axis=(0, 1)) if same.ndim > 2 else np.zeros((), dtype=bool)
-            record.edges.append(_note(met[0].cause, where, backward, forward, before, beyond))
-        _, _, slopes, off = _numbers(value, machine.directions, batch)
         nearer = np.abs(slopes - backward) < np.abs(slopes - forward)
         t = np.where(same, 0.5 * (backward + forward), np.where(nearer, backward, forward))
         et = np.where(same, np.maximum(before, beyond), np.where(nearer, before, beyond))
@@ -69,8 +116,9 @@ def as_a_whole(machine: Machine, term: Term, given: Value, run: Run) -> Value:
             near = (np.abs(slopes - t) <= off + et + ALIKE * np.abs(t)) & (et <= ALIKE * np.abs(slopes))
             holds, endless = near | ~np.isfinite(t), np.isinf(backward) & np.isinf(forward)
             t, et = np.where(holds, slopes, t), np.where(endless, np.inf, np.where(holds, off, et))
-    rows = iter(zip(t, et, strict=True))
-    return map_cells(value, lambda cell: Cell(cell.v, cell.e, *map(tuple, next(rows))))
+    if same.all():
+        return t, et, None
+    return t, et, np.asarray(same.all(axis=(0, 1)) if same.ndim > 2 else False)
 
 
 def _one_integral(linker: Linker, term: Term) -> bool:
@@ -93,10 +141,17 @@ def _one_integral(linker: Linker, term: Term) -> bool:
     return isinstance(term, Integral)
 
 
-def _note(cause: TwoSided, left_out: Any, *sides: Array) -> OneSidedDerivatives:
-    """The derivatives on both sides, of those members for which they differ."""
-    flat = (np.where(left_out, np.nan, side) for side in sides)
-    return OneSidedDerivatives(cause, *(side.reshape(-1, *side.shape[2:]) for side in flat))
+def _note(cause: TwoSided, same: Bools, shape: tuple[int, ...], there: Any, sides: Sides) -> OneSidedDerivatives:
+    """The derivatives on both sides, of those members for which they differ. shape, there: of the whole batch's
+    tangents, and which of these were looked at."""
+
+    def of_all(side: Array) -> Array:
+        whole = np.full(shape, np.nan)
+        whole[there] = np.where(same, np.nan, side)
+        return whole.reshape(-1, *shape[2:])
+
+    (backward, before), (forward, beyond) = sides
+    return OneSidedDerivatives(cause, *map(of_all, (backward, forward, before, beyond)))
 
 
 def _led_to(machine: Machine, given: Value, run: Run, here: Parts, side: int) -> tuple[Array, Array]:
