@@ -15,8 +15,10 @@ from potto.calculus.checking.conditions import conditions_of
 from potto.calculus.checking.diffeo import exported
 from potto.calculus.checking.guards import unguarded
 from potto.calculus.explanation.explain import describe
+from potto.calculus.explanation.fields import fields_of
 from potto.calculus.explanation.layout import WIDTH, DerivativeText, IntegralText, Show, meets
 from potto.calculus.explanation.readable import in_decimals
+from potto.calculus.explanation.symbols import Rewrite
 from potto.calculus.inlining.expand import expanded
 from potto.calculus.surfaces.branch_cuts import opened
 from potto.core.printer import format_term
@@ -120,10 +122,10 @@ def _part(word: str, texts: tuple[str, ...]) -> list[str]:
 
 def surfaces(db: Database, file: str, expr: nodes.Expr) -> tuple[str, ...]:
     """Where the value or the integrand of an expression jumps: `x + y + c = 0`, each once."""
-    return tuple(_surfaces(db, elaborate_expression(db, file, expr).term))
+    return tuple(_surfaces(db, elaborate_expression(db, file, expr).term, lambda term: term))
 
 
-def _surfaces(db: Database, term: Term) -> dict[str, None]:
+def _surfaces(db: Database, term: Term, fields: Rewrite) -> dict[str, None]:
     while isinstance(term, Deriv | Global):  # another name for it, or its derivative, has the same ones
         term = term.function if isinstance(term, Deriv) else core(db, term.module, term.name).term
     found = conditions_of(term, lambda g: exported(db, g.module, g.name), lambda g: core(db, g.module, g.name).term)
@@ -132,30 +134,35 @@ def _surfaces(db: Database, term: Term) -> dict[str, None]:
     known = [condition.surface for condition in found]
     readable = [surface for surface in own if not any(isinstance(node, App) for node in postorder(surface))]
     simplified = (simplify(in_decimals(surface)) for surface in (*known, *readable))
-    texts = (format_term(surface) for surface in simplified if not isinstance(surface, Const))  # that crosses nothing
+    texts = (format_term(fields(surface)) for surface in simplified if not isinstance(surface, Const))  # it is crossed
     return dict.fromkeys(f"{_COPY.sub('', text)} = 0" for text in texts)
 
 
 def derivative_facts(db: Database, file: str, name: str) -> DerivativeFacts | None:
     """The derivative of a definition in symbols; None for one that is not a function."""
     whole = core(db, file, name).term
-    term = whole
+    term, type = whole, interface(db, file, name).type
     while isinstance(term, Deriv | Global):
-        term = term.function if isinstance(term, Deriv) else core(db, term.module, term.name).term
+        if isinstance(term, Global):
+            type = interface(db, term.module, term.name).type
+            term = core(db, term.module, term.name).term
+        else:
+            term = term.function
     if not isinstance(term, Lam):
         return None
     if not is_recursive(db, file, name):
         term = expanded(term, lambda g: _unless_recursive(db, g))
+    fields = fields_of(db, type)
     type = interface(db, file, name).type
     derived = format_type(derivative_type(type))
-    found = describe(term, name, derived, lambda g: core(db, g.module, g.name).term)
+    found = describe(term, name, derived, lambda g: core(db, g.module, g.name).term, fields)
     return DerivativeFacts(
         name,
         format_type(type),
         derived,
-        tuple(_surfaces(db, whole)),
+        tuple(_surfaces(db, whole, fields)),
         tuple(map(_integral_facts, found.integrals)),
-        None if found.alone else _body_facts(term, found),
+        None if found.alone else _body_facts(term, found, fields),
         found.tangent,
         found.conditions,
         tuple(sorted(found.tangents)),
@@ -173,10 +180,10 @@ def _integral_facts(found: IntegralText) -> PartFacts:
                      found.bounds, reason, found.continuous, found.each)  # fmt: skip
 
 
-def _body_facts(term: Term, found: DerivativeText) -> PartFacts:
+def _body_facts(term: Term, found: DerivativeText, fields: Rewrite) -> PartFacts:
     """A body that is no integral by itself; what it is around its integrals is seen in the whole derivative."""
     while isinstance(term, Lam):
         term = term.body
     interior = "" if found.integrals else found.smooth
-    return PartFacts(format_term(unguarded(term)[0]), interior, found.deltas, (), "; ".join(found.problems),
+    return PartFacts(format_term(fields(unguarded(term)[0])), interior, found.deltas, (), "; ".join(found.problems),
                      found.continuous)  # fmt: skip

@@ -1,7 +1,7 @@
 """Numpy's files: one array (NPY), or a zip file of several (NPZ).
 
-Owns `array_head`, `table_head` for shapes, read from the heads without numpy, and `array_file`, `table_file` for
-values. An NPY file whose elements have named parts is a table of these. Nothing is unpickled.
+Owns `array_head`, `table_head` for shapes, read without numpy where no number can be nan or infinite, and `array_file`,
+`table_file` for values. An NPY file whose elements have named parts is a table of these. Nothing is unpickled.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 import ast
 import io
 import re
+import sys
 from collections.abc import Callable, Iterator
 from math import prod
 from typing import TYPE_CHECKING, TypeVar
@@ -27,6 +28,8 @@ _PICKLE = b"\x80"
 _LONGEST = 10_000  # what numpy, too, takes for the longest head
 _REAL = re.compile(r"[<>|=]?(?:b1|[iu][1248]|f(?:2|4|8|12|16))")
 _ODD = {"c": "complex numbers", "U": "texts", "S": "texts", "M": "dates", "m": "durations", "V": "records"}
+# The byte of sign and exponent that nan and infinities have, and few other numbers, by the size of a number.
+_LARGE = {"f2": bytes((*range(0x7C, 0x80), *range(0xFC, 0x100))), "f4": b"\x7f\xff", "f8": b"\x7f\xff"}
 _SAVE = "save it as an array of real numbers: `numpy.save(path, array.astype(float))`"
 _SAVE_MANY = "save arrays of real numbers by their names: `numpy.savez(path, x=x, y=y)`"
 _T = TypeVar("_T")
@@ -62,9 +65,11 @@ class _Head(Struct, frozen=True):
         return bool(self.parts[0].name)
 
 
-def array_head(content: bytes) -> Number | Sizes | Columns:
-    """The shape of an NPY file."""
+def array_head(content: bytes) -> Number | Sizes | Columns | None:
+    """The shape of an NPY file; None where its numbers have to be looked at."""
     head = _checked(content, len(content))
+    if not _surely_finite(head, content):
+        return None
     if not head.named:
         return _shape(head.dimensions)
     names = identifiers([part.name for part in head.parts])
@@ -81,14 +86,17 @@ def array_file(content: bytes) -> float | Array | Table:
     return Table(tuple((name, _array(head, content, part.name)) for name, part in zip(names, head.parts)))
 
 
-def table_head(content: bytes) -> Columns:
-    """The shape of an NPZ file."""
+def table_head(content: bytes) -> Columns | None:
+    """The shape of an NPZ file; None where its numbers have to be looked at."""
 
-    def head(archive: ZipFile, entry: ZipInfo) -> Number | Sizes:
-        with archive.open(entry) as file:
-            return _shape(_without_names(_checked(file.read(_LONGEST + 12), entry.file_size)).dimensions)
+    def head(archive: ZipFile, entry: ZipInfo) -> Number | Sizes | None:
+        found = archive.read(entry)
+        known = _without_names(_checked(found, len(found)))
+        return _shape(known.dimensions) if _surely_finite(known, found) else None
 
-    return Columns(tuple(_entries(content, head)))
+    fields = tuple(_entries(content, head))
+    finite = tuple((name, shape) for name, shape in fields if shape is not None)
+    return Columns(finite) if len(finite) == len(fields) else None
 
 
 def table_file(content: bytes) -> Table:
@@ -99,6 +107,21 @@ def table_file(content: bytes) -> Table:
         return _array(_without_names(_checked(found, len(found))), found)
 
     return Table(tuple(_entries(content, value)))
+
+
+def _surely_finite(head: _Head, content: bytes) -> bool:
+    """Whether no number of an array can be nan or infinite, by one of its bytes: 1 ns a number."""
+    offset, width = head.start, sum(part.bytes for part in head.parts)
+    for part in head.parts:
+        kind, size = part.dtype.lstrip("<>|="), part.bytes // prod(part.dimensions)
+        if kind.startswith("f"):
+            big = part.dtype.startswith(">") or (part.dtype.startswith("=") and sys.byteorder == "big")
+            firsts = range(offset + (0 if big else size - 1), offset + part.bytes, size)
+            tops = (content[first : head.end : width] for first in firsts)
+            if kind not in _LARGE or any(byte in top for top in tops for byte in _LARGE[kind]):
+                return False
+        offset += part.bytes
+    return True
 
 
 def _without_names(head: _Head) -> _Head:

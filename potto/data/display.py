@@ -27,7 +27,7 @@ def summary(value: Value) -> str:
     `[100] from 0 to 9.9, mean 4.95 ▁▁▂▂▃▃▄▄▅▅▆▆▇▇██`
     """
     if isinstance(value, Table):
-        shown = [f"{name} {summary(field)}" for name, field in value.fields[:_MOST]]
+        shown = [f"{name} {_within(field)}" for name, field in value.fields[:_MOST]]
         more = len(value.fields) - len(shown)
         left_out = [f"without {', '.join(value.texts)}: no numbers"] if value.texts else []
         return "; ".join([*shown, *([f"and {more} more"] if more else []), *left_out])
@@ -42,6 +42,11 @@ def summary(value: Value) -> str:
     spread = f"from {_short(low)} to {_short(high)}, mean {_short(mean)}" if low < high else f"all {_short(low)}"
     rows = f" of rows of {length}" if isinstance(value.item, Row) else ""
     return f"[{', '.join(map(str, value.dimensions))}]{rows} {spread} {_course(lines)}"
+
+
+def _within(value: Value) -> str:
+    """A field in the line of its table."""
+    return f"({summary(value)})" if isinstance(value, Table) else summary(value)
 
 
 def _short(number: float) -> str:

@@ -22,10 +22,11 @@ from potto.data.values import Shape, Value, shape
 
 
 class _Kind(Struct, frozen=True):
-    """How a kind of file is read. head: its shape, where that takes less than its values."""
+    """How a kind of file is read. head: its shape, where that takes less than its values, and the file is known to be
+    sound without them."""
 
     value: Callable[[bytes], Value]
-    head: Callable[[bytes], Shape] | None = None
+    head: Callable[[bytes], Shape | None] = lambda content: None
 
 
 _PICTURE = _Kind(pixels.picture, pixels.picture_head)
@@ -115,13 +116,14 @@ def suggest(path: Path, siblings: Iterable[str]) -> tuple[str, ...]:
 
 
 def shape_of(path: Path, content: bytes) -> Shape | DataMistake:
-    """What kind of value a file holds. Of arrays and pictures it reads the heads only; numpy is never loaded."""
+    """What kind of value a file holds. Arrays and pictures that are sound at sight are known by their heads, without
+    numpy."""
     try:
-        kind = _kind(path)
-        if kind.head is not None:
-            return kind.head(content)
+        known = _kind(path).head(content)
     except Refused as refused:
         return refused.mistake
+    if known is not None:
+        return known
     found = values_of(path, content)
     return found if isinstance(found, DataMistake) else shape(found)
 

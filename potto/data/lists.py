@@ -1,6 +1,8 @@
-"""JSON: a number, nested lists of numbers that fill a box, an object of these, or a list of objects, row by row.
+"""JSON: numbers, lists that fill a box and objects, in each other as they come.
 
-Owns `nested`. Places are told by their path, `speed[3][0]`, counted from 0 as JSON's users do, and by their line.
+Owns `nested`. A box of objects with the same names is an object of boxes, so that a list of objects is read as the
+columns of a table. What holds texts alone is left out, as in tables. Places are told by their path, `speed[3][0]`,
+counted from 0 as JSON's users do, and by their line.
 """
 
 from __future__ import annotations
@@ -27,17 +29,34 @@ _RECORDS = 'write an object of lists, as in {"x": [1, 2], "y": [3, 4]}'
 _BESIDE = "lists beside each other are equally long, so that they make an array"
 _ROWS = 'in a list of objects all have the same names, as in [{"x": 1, "y": 2}, {"x": 3, "y": 4}]'
 _NAMES = {dict: "an object", list: "a list", str: "a text", bool: "true or false", type(None): "null"}
+_MEANT = re.compile(r"\s*[+-]?[\d.,]*\d\s*(?:[eE][+-]?\d+)?\s*")  # as a number, though it stands in quotes
 
 
-class _Text(Struct, frozen=True):
-    """A JSON text. by_rows: it is a list of objects, read column by column."""
+class _Box(Struct, frozen=True):
+    """Values of one form within a JSON text, in the order of the text.
 
-    whole: str
-    by_rows: bool = False
+    steps: the way to them, each step into lists of a length or into objects under a name.
+    """
 
-    def placed(self, place: Path) -> Path:
-        """Where in the text something is that is known by its column, then its row."""
-        return (place[1], place[0], *place[2:]) if self.by_rows else place
+    text: str
+    entries: Sequence[Any]
+    steps: Path = ()
+
+    @property
+    def dimensions(self) -> tuple[int, ...]:
+        return tuple(step for step in self.steps if isinstance(step, int))
+
+    def place(self, at: int) -> Path:
+        """Where the entry stands that is the `at`-th."""
+        found: list[str | int] = []
+        for step in reversed(self.steps):
+            at, inner = divmod(at, step) if isinstance(step, int) else (at, step)
+            found.insert(0, inner)
+        return tuple(found)
+
+    def under(self, name: str) -> _Box:
+        """What stands under a name in each of these objects."""
+        return _Box(self.text, [entry[name] for entry in self.entries], (*self.steps, name))
 
 
 def nested(text: str) -> Value:
@@ -52,28 +71,67 @@ def nested(text: str) -> Value:
         raise Refused(DataMistake(MALFORMED, message, error.lineno, place=place)) from None
     except RecursionError:
         raise malformed(_DEEP) from None
-    if isinstance(data, list) and data and isinstance(data[0], dict):
-        return _by_rows(text, data)
-    if not isinstance(data, dict):
-        return _value(_Text(text), data, ())
-    if not data:
-        raise malformed("the file holds no values: its object is empty", hint=_RECORDS)
-    return Table(tuple((name, _value(_Text(text), data[key], (key,))) for name, key in zip(identifiers([*data]), data)))
+    return _value(_Box(text, [data]))
 
 
-def _by_rows(text: str, rows: list[Any]) -> Table:
-    """A list of objects with the same names: a table, row by row."""
-    names = [*rows[0]]
-    for at, row in enumerate(rows):
-        if not isinstance(row, dict):
-            raise _at(_Text(text), (at,), "this stands among objects", "…", "an object", _ROWS)
-        if row.keys() != rows[0].keys():
-            named, usual = (", ".join(map(quoted, each)) or "no names" for each in (row, rows[0]))
-            raise _at(_Text(text), (at,), f"the object has {named}, and the first one {usual}", named, usual, _ROWS)
+def _value(box: _Box) -> Value:
+    """A number, an array or a table: lists are opened level by level, and each level is of one kind."""
+    while (kinds := set(map(type, box.entries))) == {list}:
+        box = _opened(box)
+    if kinds == {dict}:
+        return _table(box)
+    if kinds != {float}:
+        raise _odd(box)
+    numbers = box.entries
+    if not all(map(isfinite, numbers)):
+        at = next(at for at, number in enumerate(numbers) if not isfinite(number))
+        hint = "a number is at most 1.8e308; leave out what has no value"
+        raise _at(box, box.place(at), f"{numbers[at]} is not finite", str(numbers[at]), "a number", hint)
+    return Array(box.dimensions, Number(), array("d", numbers)) if box.dimensions else float(numbers[0])
+
+
+def _opened(box: _Box) -> _Box:
+    """The entries of lists that are equally long."""
+    lengths = set(map(len, box.entries))
+    if len(lengths) > 1:
+        raise _ragged(box)
+    if len(box.dimensions) == DEEPEST:
+        raise malformed(_DEEP)
+    if lengths == {0}:
+        raise _at(box, box.place(0), "the list is empty", "[]", "numbers", "")
+    return _Box(box.text, list(chain.from_iterable(box.entries)), (*box.steps, *lengths))
+
+
+def _table(box: _Box) -> Table:
+    """Objects with the same names, as one object."""
+    names = [*box.entries[0]]
+    for at, entry in enumerate(box.entries):
+        if entry.keys() != box.entries[0].keys():
+            named, usual = (", ".join(map(quoted, each)) or "no names" for each in (entry, names))
+            message = f"the object has {named}, and the first one {usual}"
+            raise _at(box, box.place(at), message, named, usual, _ROWS)
     if not names:
-        raise malformed("the file holds no values: its objects are empty", hint=_ROWS)
-    columns = ((field, name, [row[name] for row in rows]) for field, name in zip(identifiers(names), names))
-    return Table(tuple((field, _value(_Text(text, True), data, (name,))) for field, name, data in columns))
+        several, hint = ("objects are", _ROWS) if box.dimensions else ("object is", _RECORDS)
+        raise malformed(f"the file holds no values: its {several} empty", hint=hint)
+    fields = [(field, box.under(name)) for field, name in zip(identifiers(names), names)]
+    texts = [field for field, under in fields if _of_texts(under.entries)]
+    if len(texts) == len(fields):
+        texts = []  # of which the first is told
+    return Table(tuple((field, _value(under)) for field, under in fields if field not in texts), tuple(texts))
+
+
+def _of_texts(entries: Sequence[Any]) -> bool:
+    """Whether values are texts, and no numbers in quotes, in whatever they stand in; some may be missing."""
+    some, waiting = False, [*reversed(entries)]
+    while waiting:
+        entry = waiting.pop()
+        if isinstance(entry, list | dict):
+            waiting.extend(entry.values() if isinstance(entry, dict) else entry)
+        elif isinstance(entry, str) and not _MEANT.fullmatch(entry):
+            some = True
+        elif entry is not None:
+            return False
+    return some
 
 
 def _object(pairs: Sequence[tuple[str, Any]]) -> dict[str, Any]:
@@ -85,69 +143,38 @@ def _object(pairs: Sequence[tuple[str, Any]]) -> dict[str, Any]:
     return found
 
 
-def _value(text: _Text, data: Any, path: Path) -> float | Array:
-    """A number or an array: lists are opened level by level, and each level is of one kind."""
-    dimensions: list[int] = []
-    level = [data]
-    while (kinds := set(map(type, level))) == {list}:
-        lengths = set(map(len, level))
-        if len(lengths) > 1:
-            raise _ragged(text, level, dimensions, path)
-        if len(dimensions) == DEEPEST:
-            raise malformed(_DEEP)
-        dimensions.append(lengths.pop())
-        level = list(chain.from_iterable(level))
-        if not level:
-            raise _at(text, (*path, *_index(0, dimensions[:-1])), "the list is empty", "[]", "numbers", "")
-    if kinds != {float}:
-        raise _odd(text, level, dimensions, path)
-    if not all(map(isfinite, level)):
-        at = next(at for at, number in enumerate(level) if not isfinite(number))
-        hint = "a number is at most 1.8e308; leave out what has no value"
-        place = (*path, *_index(at, dimensions))
-        raise _at(text, place, f"{level[at]} is not finite", str(level[at]), "a number", hint)
-    return Array(tuple(dimensions), Number(), array("d", level)) if dimensions else level[0]
-
-
-def _ragged(text: _Text, level: Sequence[Any], dimensions: Sequence[int], path: Path) -> Refused:
-    at, length = next((at, len(entry)) for at, entry in enumerate(level) if len(entry) != len(level[0]))
-    usual = counted(len(level[0]), "value")
-    place = (*path, *_index(at, dimensions))
+def _ragged(box: _Box) -> Refused:
+    first, *_ = lists = box.entries
+    at, length = next((at, len(entry)) for at, entry in enumerate(lists) if len(entry) != len(first))
+    usual = counted(len(first), "value")
     message = f"the list has {length}, but those before it have {usual}"
-    return _at(text, place, message, str(length), usual, _BESIDE)
+    return _at(box, box.place(at), message, str(length), usual, _BESIDE)
 
 
-def _odd(text: _Text, level: Sequence[Any], dimensions: Sequence[int], path: Path) -> Refused:
-    """What is said of the first entry that is not a number, or is a list among numbers or a number among lists."""
-    lists = isinstance(level[0], list)
-    at = next(at for at, entry in enumerate(level) if not isinstance(entry, list if lists else float))
-    entry, place = level[at], (*path, *_index(at, dimensions))
+def _odd(box: _Box) -> Refused:
+    """What is said of the first entry that is of another kind than those before it, or is no number."""
+    first, kinds = box.entries[0], (float, list, dict)
+    usual = next((kind for kind in kinds if isinstance(first, kind)), float)
+    at = next(at for at, entry in enumerate(box.entries) if not isinstance(entry, usual))
+    entry, place = box.entries[at], box.place(at)
+    if usual is dict:
+        return _at(box, place, "this stands among objects", "…", "an object", _ROWS)
     if isinstance(entry, float):
-        return _at(text, place, "a number stands among lists", f"{entry:g}", "a list", _BESIDE)
+        return _at(box, place, "a number stands among lists", f"{entry:g}", "a list", _BESIDE)
     if isinstance(entry, list):
-        return _at(text, place, "a list stands among numbers", "[…]", "a number", _BESIDE)
+        return _at(box, place, "a list stands among numbers", "[…]", "a number", _BESIDE)
     shown = {dict: "{…}", str: entry, bool: str(entry).lower()}.get(type(entry), "null")
     what = f"{quoted(entry)} is a text" if isinstance(entry, str) else f"this is {_NAMES[type(entry)]}"
     hint = _RECORDS if isinstance(entry, dict) else "only numbers can be read"
-    return _at(text, place, f"{what}, not a number", shown, "a number", hint)
+    return _at(box, place, f"{what}, not a number", shown, "a number", hint)
 
 
-def _at(text: _Text, place: Path, message: str, found: str, expected: str, hint: str) -> Refused:
-    place = text.placed(place)
-    row = _line(text.whole, place)
+def _at(box: _Box, place: Path, message: str, found: str, expected: str, hint: str) -> Refused:
+    row = _line(box.text, place)
     names = "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in place).removeprefix(".")
     where = f"line {row}, {quoted(names)}" if names else f"line {row}"
     column = next((key + 1 for key in reversed(place) if isinstance(key, int)), None)
     return bad_row(f"{where}: {message}", row, column, found, expected, hint)
-
-
-def _index(at: int, dimensions: Sequence[int]) -> tuple[int, ...]:
-    """The indices of the entry of a box that is the `at`-th in the order of the text."""
-    found: list[int] = []
-    for length in reversed(dimensions):
-        at, rest = divmod(at, length)
-        found.insert(0, rest)
-    return tuple(found)
 
 
 def _line(text: str, place: Path) -> int:

@@ -1,9 +1,9 @@
 """Pictures: PNG and JPEG as arrays of light, from 0 to 1.
 
-Owns `picture_head`, which finds sizes in the bytes, and `picture`, which needs Pillow for all but colours of 16 bits:
-of those Pillow keeps 8, which is what interlaced ones are left with. A grey picture is an array of numbers, a coloured
-one of rows of three. Transparency is dropped, palettes are looked up; pixels stay as they are stored, whatever a note
-in the file says about how to turn them.
+Owns `picture_head`, which finds sizes in the bytes of a sound file, and `picture`, which needs Pillow for all but
+colours of 16 bits: of those Pillow keeps 8, which is what interlaced ones are left with. A grey picture is an array of
+numbers, a coloured one of rows of three. Transparency is dropped, palettes are looked up; pixels stay as they are
+stored, whatever a note in the file says about how to turn them.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 from msgspec import Struct
 
 from potto.data.mistakes import NO_PACKAGE, DataMistake, Refused, malformed
-from potto.data.scanlines import CHANNELS, deep
+from potto.data.scanlines import CHANNELS, deep, is_sound
 from potto.data.values import Array, Item, Number, Row, Sizes
 from potto.extras import install_command
 
@@ -27,27 +27,30 @@ _PNG, _JPEG = b"\x89PNG\r\n\x1a\n", b"\xff\xd8"
 _GREY, _GREY_ALPHA = 0, 4  # colour types of PNG
 # The segments of JPEG that tell sizes: start of frame, but not those of tables, which lie between.
 _FRAMES = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
+_END = b"\xff\xd9"  # of a JPEG; within its pixels no such bytes stand beside each other
 _BARE = frozenset({0x01, *range(0xD0, 0xD9)})  # segments without a length
 _AGAIN = "write the picture again as PNG or JPEG"
 
 
 class _Head(Struct, frozen=True):
-    """Sizes, whether there are colours, and the colour type of a PNG whose values Pillow would cut to 8 bits."""
+    """Sizes, whether there are colours, and the colour type of a PNG whose values Pillow would cut to 8 bits. sound:
+    the file is whole, as far as that is seen without Pillow."""
 
     height: int
     width: int
     coloured: bool
     deep: int | None = None
+    sound: bool = True
 
     @property
     def item(self) -> Item:
         return Row(3) if self.coloured else Number()
 
 
-def picture_head(content: bytes) -> Sizes:
-    """The shape of a picture."""
+def picture_head(content: bytes) -> Sizes | None:
+    """The shape of a picture; None for one that may be damaged."""
     head = _head(content)
-    return Sizes((head.height, head.width), head.item)
+    return Sizes((head.height, head.width), head.item) if head.sound else None
 
 
 def picture(content: bytes) -> Array:
@@ -76,7 +79,7 @@ def _png(content: bytes) -> _Head:
         raise malformed("the head of the PNG file is broken", hint=_AGAIN)
     width, height, depth, colour, interlaced = struct.unpack(">IIBBxxB", content[16:29])
     deep = colour if depth == 16 and colour in CHANNELS and not interlaced else None
-    return _Head(height, width, colour not in (_GREY, _GREY_ALPHA), deep)
+    return _Head(height, width, colour not in (_GREY, _GREY_ALPHA), deep, is_sound(content))
 
 
 def _jpeg(content: bytes) -> _Head:
@@ -88,7 +91,7 @@ def _jpeg(content: bytes) -> _Head:
             continue
         if mark in _FRAMES and at + 10 <= len(content):
             height, width, channels = struct.unpack(">HHB", content[at + 5 : at + 10])
-            return _Head(height, width, channels > 1)
+            return _Head(height, width, channels > 1, sound=content.find(_END, at) >= 0)
         at += 2 + struct.unpack(">H", content[at + 2 : at + 4])[0]
     raise malformed("the JPEG file does not say how large the picture is", hint=_AGAIN)
 

@@ -43,11 +43,12 @@ class Columns(Struct, frozen=True):
     """A record: names, which are identifiers and differ, and what stands under them. texts: the names of columns that
     were left out, since no value in them is a number."""
 
-    fields: tuple[tuple[str, Number | Sizes], ...]
+    fields: tuple[tuple[str, Shape], ...]
     texts: tuple[str, ...] = ()
 
 
 Shape = Number | Sizes | Columns
+SEPARATOR = "."  # between the names of records within records
 
 
 class Array(Struct, frozen=True, eq=False, dict=True):
@@ -78,13 +79,16 @@ class Array(Struct, frozen=True, eq=False, dict=True):
 
 
 class Table(Struct, frozen=True, eq=False):
-    """A record of arrays and numbers, in the order of the file. texts: as in `Columns`."""
+    """A record of arrays, numbers and records, in the order of the file. texts: as in `Columns`."""
 
-    fields: tuple[tuple[str, float | Array], ...]
+    fields: tuple[tuple[str, Value], ...]
     texts: tuple[str, ...] = ()
 
-    def __getitem__(self, name: str) -> float | Array:
-        return dict(self.fields)[name]
+    def __getitem__(self, path: str) -> Value:
+        """What stands under a name; under `camera.focal`, in the record that stands under `camera`."""
+        name, _, rest = path.partition(SEPARATOR)
+        found = dict(self.fields)[name]
+        return found[rest] if rest and isinstance(found, Table) else found
 
 
 Value = float | Array | Table
@@ -93,11 +97,7 @@ Value = float | Array | Table
 def shape(value: Value) -> Shape:
     """The shape of a value."""
     if isinstance(value, Table):
-        return Columns(tuple((name, _plain(field)) for name, field in value.fields), value.texts)
-    return _plain(value)
-
-
-def _plain(value: float | Array) -> Number | Sizes:
+        return Columns(tuple((name, shape(field)) for name, field in value.fields), value.texts)
     return Sizes(value.dimensions, value.item) if isinstance(value, Array) else Number()
 
 

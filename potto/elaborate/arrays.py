@@ -44,11 +44,11 @@ from potto.core.terms import (
     var,
 )
 from potto.data.mistakes import DataMistake
-from potto.data.values import Columns
+from potto.data.values import SEPARATOR, Columns, Shape
 from potto.elaborate.context import Elaboration, rule
 from potto.elaborate.shapes import is_vector
 from potto.elaborate.values import Scope, Value
-from potto.modules.data import data_file
+from potto.modules.data import DataFile, data_file
 from potto.syntax import nodes
 from potto.types.loading import type_of
 from potto.types.types import ANY_SIZE, AnySize, ArrayOf, TupleOf, Type, holds_functions, resolve
@@ -149,11 +149,16 @@ def loaded(elaboration: Elaboration, written: str) -> Term:
     found = data_file(elaboration.db, elaboration.file, written)
     if isinstance(found, DataMistake):
         return hole(f"{written}: {found.message}")
-    names = [name for name, _ in found.shape.fields] if isinstance(found.shape, Columns) else [""]
-    parts = [data(found.path, found.digest, name) for name in names]
-    whole = tuple_(parts) if isinstance(found.shape, Columns) else parts[0]
+    whole = _held(found, found.shape, "")
     elaboration.shapes.known[whole] = type_of(found.shape, found.path)
     return whole
+
+
+def _held(file: DataFile, shape: Shape, name: str) -> Term:
+    """What a file of data holds under a name."""
+    if not isinstance(shape, Columns):
+        return data(file.path, file.digest, name)
+    return tuple_([_held(file, item, f"{name}{SEPARATOR if name else ''}{own}") for own, item in shape.fields])
 
 
 # What goes through ranges and arrays

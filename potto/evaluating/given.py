@@ -22,7 +22,8 @@ from potto.modules.usage import names_in, used_names
 from potto.reports.render import Located, ProgramError, display_name
 from potto.source import SourceText, Span
 from potto.syntax import parse_expression
-from potto.types import groups_of, infer_expression
+from potto.types import groups_of, infer_expression, interface
+from potto.types.mismatches import rows_of
 
 Given = Sequence[tuple[str, str]]
 COMMAND_LINE = "<command line>"
@@ -35,13 +36,21 @@ def give(library: Library, file: str, given: Given) -> None:
         wrong = [Located(COMMAND_LINE, d) for d in parse_expression(text).diagnostics if d.severity == "error"]
         if wrong:
             raise as_typed(f"--set {name}=", text, wrong, library)
-        library.put(file, _changed(library, file, name, text))
+        library.put(file, _changed(library, file, name, _in_rows(library, file, name, text)))
     for name, text in given:
         own = definition_errors(library.db, DefinitionTarget(file, name))
         if own:
             start = _start(library, file, name) + len(f"{name} = ")
             moved = [Located(COMMAND_LINE, _moved(located.diagnostic, file, -start)) for located in own]
             raise as_typed(f"--set {name}=", text, moved, library)
+
+
+def _in_rows(library: Library, file: str, name: str, text: str) -> str:
+    """What a file holds as an array of records, where the name stood for such."""
+    if not _LOADED.fullmatch(text) or name not in names(library.db, file):
+        return text
+    table = infer_expression(library.db, file, parse_expression(text).expr).type
+    return rows_of(table, interface(library.db, file, name).type, text) or text
 
 
 def as_typed(before: str, text: str, wrong: Iterable[Located], library: Library) -> ProgramError:

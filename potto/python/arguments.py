@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import numbers
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Set
 from typing import Any
 
 import numpy as np
@@ -21,6 +21,7 @@ from potto.kernels.cells import Cell, Rows, Value, listed
 from potto.kernels.errors import wrong_call
 from potto.python.arrays import batch_shapes, over_batch
 from potto.runtime.answers.estimate import Estimate
+from potto.runtime.answers.named import alike
 from potto.runtime.answers.printing import format_digits
 from potto.source import Span
 from potto.types import format_type
@@ -109,7 +110,7 @@ class Batch(Struct, frozen=True):
         if isinstance(part, list):
             return self._array(part)
         if isinstance(part, tuple):
-            return tuple(self._restored(item) for item in part)
+            return alike(part, [self._restored(item) for item in part])
         if self.shape is None:
             return float(part)
         if 0 in self.shape:
@@ -340,7 +341,8 @@ def _complaint(name: str, argument: Any, type: Type, own: Type | None) -> str | 
             return _tuple_misfit(name, argument, items, dual)
         case ArrayOf():
             fits = isinstance(argument, list | np.ndarray | Estimate | Rows)
-            return None if fits else f"an array is needed, not {_kind(argument)}"
+            more = ": `list(…)` makes one of it" if isinstance(argument, tuple | range | Set | Iterator) else ""
+            return None if fits else f"an array is needed, not {_kind(argument)}{more}"
         case Real() | Dist():
             fits = not isinstance(argument, tuple | list)
             return None if fits else f"a number is needed, not {_kind(argument)}"

@@ -6,6 +6,7 @@ Owns `by_name`, `as_matrix`, `must_match`, `weighted`, `in_lists` and `form_of`.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any, cast
 
 import numpy as np
@@ -13,6 +14,7 @@ import numpy as np
 from potto.kernels.cells import Cell, Number, Rows, Value, all_cells, map_cells
 from potto.kernels.errors import wrong_call
 from potto.python.arguments import Batch
+from potto.runtime.answers.named import alike
 from potto.runtime.evaluate import number, told_rows
 
 
@@ -58,9 +60,13 @@ def _by_elements(value: Rows, slopes: list[Any]) -> list[Any]:
     first = slopes[0]
     if isinstance(first, tuple | list):
         parts = [_by_elements(value, [slope[place] for slope in slopes]) for place in range(len(first))]
-        return cast("list[Any]", _together(value, type(first), parts))
+        return cast("list[Any]", _together(value, partial(_like, first), parts))
     rest = iter(slopes)
     return told_rows(cast(Rows, map_cells(value, lambda _: Cell(next(rest)))), lambda cell: cell.v)
+
+
+def _like(whole: Any, parts: Sequence[Any]) -> Any:
+    return alike(whole, parts) if isinstance(whole, tuple) else list(parts)
 
 
 def _together(value: Value, kind: Callable[[Any], Any], parts: Sequence[Any]) -> Any:

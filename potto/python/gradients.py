@@ -30,10 +30,13 @@ from potto.python.moving import each_moving, moved, size, with_places
 from potto.python.remade import remade
 from potto.python.sided import with_sides
 from potto.runtime.answers.estimate import Estimate
+from potto.runtime.answers.named import named
+from potto.runtime.answers.shown import named_answer
 from potto.runtime.evaluate import Clock, bar, number, report, told
 from potto.runtime.evaluation.machine import Machine
 from potto.runtime.evaluation.record import Record
 from potto.runtime.evaluation.sides import as_a_whole
+from potto.types.types import REAL
 
 # Parameters, from which on a tape is swept back instead of carrying a tangent for each: it costs 2.5 to 3.4 values
 # whatever their number, tangents 1.6 at 4 and, where all depends on all, 2.7 at 12 and 4.8 at 64; the first call costs
@@ -170,7 +173,7 @@ def jvp(function: Function, along: Mapping[str, Any], *tangents: Any) -> Callabl
         tangents = dict(zip(names, run.extra.values(), strict=True))
         moving = {name: moved(name, run.own(name), tangents[name]) for name in names}
         value = run.evaluated(moving, run.machine.with_directions(1), lambda value: value)
-        return run.batch.shaped(report(value, run.machine, run.clock))
+        return named_answer(run.batch.shaped(report(value, run.machine, run.clock)), run.call.result)
 
     return product
 
@@ -355,7 +358,8 @@ class _Run:
 
     def answer(self, value: Value, tangents: Any, bounds: Any) -> Estimate:
         found = report(value, self.machine, self.clock)
-        return self.batch.shaped(replace(found, tangent=tangents, tangent_error=bounds))
+        shaped = self.batch.shaped(replace(found, tangent=tangents, tangent_error=bounds))
+        return replace(shaped, value=named(shaped.value, self.call.result))
 
     def one_by_one(self, slopes: list[Any], names: tuple[str, ...]) -> tuple[Any, ...]:
         """The derivatives by each number of the parameters, those of an array element by element."""
@@ -369,7 +373,8 @@ class _Run:
         """The estimate of a value, with the derivatives of `moving` in the form of the parameters."""
         directions = range(len(all_cells(tuple(self.given[name] for name in wrt))) if self.whole
                            else sum(size(name, self.given[name]) for name in wrt))  # fmt: skip
-        tangents = [told(moving, lambda cell, d=d: cell.t[d]) for d in directions]  # type: ignore[misc]
+        form = self.call.result if moving is value else REAL
+        tangents = [named(told(moving, lambda cell, d=d: cell.t[d]), form) for d in directions]  # type: ignore[misc]
         bounds = [told(moving, lambda cell, d=d: bar(cell.et[d])) for d in directions]  # type: ignore[misc]
         forms = (by_name(part, wrt, self.given, self.whole) for part in (tangents, bounds))
         found = self.answer(value, *(form[0] if len(wrt) == 1 else form for form in forms))

@@ -157,6 +157,9 @@ def _special(stop: Stop) -> Diagnostic | None:
     opened, at, before = stop.opened, stop.at, stop.before
     if at.kind == "COMMA" and opened is not None and opened.kind == "LET":
         return kinds.UNEXPECTED(at.span, "unexpected `,`", help="separate the names of a `let` by `;`, or by lines")
+    is_field = at.text.isidentifier() and stop.after is not None and stop.after.kind == "COLON"
+    if is_field and stop.tokens[0].kind == "RECORDDEF":
+        return reserved_word(at.text, at.span)
     found = _of_arrays(stop) or _behind_with(stop)
     if found is not None:
         return found
@@ -223,18 +226,31 @@ def _of_arrays(stop: Stop) -> Diagnostic | None:
 
 
 def _behind_with(stop: Stop) -> Diagnostic | None:
-    """`c with a.b = 1`, `c with a = 1, b = 2`."""
+    """`c with a.b = 1`, also in parentheses, `c with a = 1, b = 2`."""
     at, before = stop.at, stop.before
-    if at.kind == "MEMBER" and before is not None and before.kind == "WITH":
-        own, _, inner = at.text.partition(".")
+    inside = before is not None and at.kind == "EQ" and before.kind == "MEMBER" and _among_fields(stop)
+    part = before if inside else at
+    if part is not None and part.kind == "MEMBER" and (inside or (before is not None and before.kind == "WITH")):
+        own, _, inner = part.text.partition(".")
         help = f"write `c with {own} = (c.{own} with {inner} = …)`"
-        message = f"`with` changes a field of the record, and `{at.text}` is a part of one"
-        return kinds.NOT_A_NAME(at.span, message, help=help)
+        message = f"`with` changes a field of the record, and `{part.text}` is a part of one"
+        return kinds.NOT_A_NAME(part.span, message, help=help)
     follows = [token.kind for token in stop.tokens[stop.index + 1 : stop.index + 3]]
     if at.kind == "COMMA" and stop.last("WITH") is not None and follows == ["NAME", "EQ"]:
         help = "several fields stand in parentheses: `c with (a = 1, b = 2)`"
         return kinds.UNEXPECTED(at.span, "one field follows `with`", help=help)
     return None
+
+
+def _among_fields(stop: Stop) -> bool:
+    """Whether it stopped directly in the parentheses behind a `with`."""
+    open_at: list[int] = []
+    for place, token in enumerate(stop.tokens[: stop.index]):
+        if token.text in ("(", "["):
+            open_at.append(place)
+        elif token.text in (")", "]") and open_at:
+            open_at.pop()
+    return bool(open_at) and stop.tokens[open_at[-1] - 1].kind == "WITH"
 
 
 def _is_interval(stop: Stop, opened: Token) -> bool:

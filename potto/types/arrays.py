@@ -6,7 +6,7 @@ from potto.diagnostics import Related
 from potto.syntax import nodes
 from potto.types import kinds
 from potto.types.context import Inference, rule
-from potto.types.indices import goes_through, size_of
+from potto.types.indices import goes_through, size_of, whole_bounds
 from potto.types.infer import value_only
 from potto.types.integrals import summed
 from potto.types.mismatches import describe, mismatch
@@ -50,6 +50,7 @@ def _clauses(inference: Inference, clauses: tuple[nodes.Clause, ...], what: str)
         if isinstance(over, nodes.Range):
             inference.number(over.lo, f"the first value of {what}")
             inference.number(over.hi, f"the last value of {what}")
+            whole_bounds(inference, over)
             sizes.append(_count(inference, over))
             goes_through(inference, inference.local(variable, variable.name, variable.span, "index", REAL), over)
             continue

@@ -152,7 +152,9 @@ def _not_a_function(inference: Inference, node: nodes.Apply, callee: Type) -> Di
     is_number = isinstance(callee, Real)
     help, suggestions = "", tuple[Suggestion, ...]()
     if is_number and after is not None:
+        listed = isinstance(without_parentheses(node.function), nodes.Number) and isinstance(after, nodes.Number)
         help = "to multiply, write `*` between the two"
+        help = f"{help}; to list them, a comma" if listed else help
     elif isinstance(callee, TupleOf | Diffeo):
         help = "a call binds to what stands before it: write the operator between the two, or a comma"
     elif isinstance(callee, ArrayOf):

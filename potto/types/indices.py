@@ -103,6 +103,19 @@ def _whole(inference: Inference, index: nodes.Expr) -> None:
     ))  # fmt: skip
 
 
+def whole_bounds(inference: Inference, over: nodes.Range) -> None:
+    """Report a bound of a range that is written as a number that is not whole."""
+    for bound, which in ((over.lo, "first"), (over.hi, "last")):
+        value = number(bound)
+        if value is not None and not value.is_integer():
+            near = (math.floor(value), math.ceil(value)) if abs(value) < 1e9 else ()
+            inference.report(kinds.NOT_WHOLE(
+                bound.span, f"a range goes through whole numbers, but its {which} one is {value:g}",
+                label="not a whole number", help="`floor` and `ceil` make a whole number of another one",
+                suggestions=tuple(suggest(bound.span, str(number)) for number in near),
+            ))  # fmt: skip
+
+
 def _behind(inference: Inference, size: Type, node: nodes.Index, index: nodes.Expr) -> None:
     """Report an index that is the size of the array, or more, whatever that is: `xs[n]`, `xs[len(xs)]`."""
     at = shifted(size_of(inference, index), 0)

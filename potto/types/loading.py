@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 from potto.data.mistakes import TITLES, DataMistake
-from potto.data.values import Columns, Row, Shape, Sizes
+from potto.data.values import SEPARATOR, Columns, Row, Shape, Sizes
 from potto.diagnostics import Diagnostic, Related, declare
 from potto.modules.data import data_file, path_of
 from potto.modules.texts import source
@@ -38,13 +38,14 @@ def loaded(inference: Inference, node: nodes.Apply) -> Type:
     return type_of(found.shape, path_of(inference.outside.file, given.text))
 
 
-def type_of(shape: Shape, path: str) -> Type:
-    """The type of a kind of value: the columns of a table are a record's fields."""
+def type_of(shape: Shape, path: str, name: str = "") -> Type:
+    """The type of a kind of value: the columns of a table are a record's fields. name: of the record, if that is not
+    the file's."""
     if isinstance(shape, Columns):
-        record = RecordName(
-            path, path.replace("\\", "/").rpartition("/")[2], tuple(name for name, _ in shape.fields), shape.texts
-        )
-        return TupleOf(tuple(type_of(item, path) for _, item in shape.fields), record=record)
+        name = name or path.replace("\\", "/").rpartition("/")[2]
+        record = RecordName(path, name, tuple(field for field, _ in shape.fields), shape.texts)
+        items = (type_of(item, path, f"{name}{SEPARATOR}{field}") for field, item in shape.fields)
+        return TupleOf(tuple(items), record=record)
     if not isinstance(shape, Sizes):
         return REAL
     found: Type = TupleOf((REAL,) * shape.item.length) if isinstance(shape.item, Row) else REAL

@@ -114,27 +114,47 @@ def is_whole_dual(actual: Type, expected: Type) -> bool:
 
 
 def _columns(actual: Type, expected: Type, expr: nodes.Expr) -> str:
-    """What to write where a table stands for one of its columns, or for its rows."""
+    """What to write where a table stands for one of its columns, or for its rows; of columns that are no fields, and
+    the reverse, which."""
     if not isinstance(actual, TupleOf) or actual.record is None or not isinstance(expr, nodes.Name | nodes.Member):
         return ""
     item = resolve(expected.item) if isinstance(expected, ArrayOf) else expected
-    if isinstance(item, TupleOf) and item.record is not None and actual.record.name.endswith(_TABLES):
-        return _rows(actual, actual.record, item.record, print_expression(expr))
+    if isinstance(item, TupleOf) and item.record is not None and _is_table(actual):
+        missing = [f"`{field}`" for field in item.record.fields if field not in actual.record.fields]
+        if not missing:
+            return f"write its rows, `{rows_of(actual, expected, print_expression(expr))}`"
+        others = ", ".join(f"`{field}`" for field in actual.record.fields)
+        return f"it has no column {', '.join(missing)}, which `{item.record.name}` needs; its columns are {others}"
     arrays = [f"`{print_expression(expr)}.{name}`" for name in array_fields(actual)[:3]]
     return f"take one of its columns: {', '.join(arrays)}" if arrays else ""
 
 
-def _rows(table: TupleOf, columns: RecordName, record: RecordName, name: str) -> str:
-    """What to write for the rows of a table as records; of columns that are no fields, and the reverse, which."""
-    missing = [f"`{field}`" for field in record.fields if field not in columns.fields]
-    if missing:
-        others = ", ".join(f"`{field}`" for field in columns.fields)
-        return f"it has no column {', '.join(missing)}, which `{record.name}` needs; its columns are {others}"
-    first = resolve(table.items[0])
+def _is_table(type: TupleOf) -> bool:
+    """Whether what is loaded has columns that are equally long."""
+    columns = [resolve(item) for item in type.items]
+    sizes = {resolve(column.size) for column in columns if isinstance(column, ArrayOf)}
+    return (
+        type.record is not None
+        and "." in type.record.name
+        and len(sizes) == 1
+        and len(array_fields(type)) == len(columns)
+    )
+
+
+def rows_of(table: Type, wanted: Type, name: str) -> str | None:
+    """The rows of a table as an array of records; None where they are no such."""
+    actual, expected = resolve(table), resolve(wanted)
+    item = resolve(expected.item) if isinstance(expected, ArrayOf) else None
+    if not isinstance(actual, TupleOf) or not isinstance(item, TupleOf) or not _is_table(actual):
+        return None
+    columns, record = actual.record, item.record
+    if columns is None or record is None or not set(record.fields) <= set(columns.fields):
+        return None
+    first = resolve(actual.items[0])
     size = resolve(first.size) if isinstance(first, ArrayOf) else first
     last = size.number - 1 if isinstance(size, Count) else 0
     fields = ", ".join(f"{field}={name}.{field}[i]" for field in record.fields)
-    return f"write its rows, `[{record.name}({fields}) for i in 0..{last}]`"
+    return f"[{record.name}({fields}) for i in 0..{last}]"
 
 
 def array_fields(type: TupleOf) -> list[str]:
@@ -274,15 +294,17 @@ def no_field(outside: Outside, span: Span, name: str, record: RecordName) -> Dia
     if record.name.endswith(_TABLES):
         label = f"no column `{name}`"
         message = f"`{record.name}` has {label}"
-        if name in record.texts:
-            label = "holds text"
-            message = f"the column `{name}` of `{record.name}` holds text, which programs cannot use"
-            help = (
-                "only columns of numbers are loaded; write a number for each text, such as 0 and 1, in another column"
-            )
     elif "." in record.name:  # another file of data
         label = f"holds no `{name}`"
         message = f"`{record.name}` {label}"
+    if name in record.texts:
+        label = "holds text"
+        column = "the column " if record.name.endswith(_TABLES) else ""
+        message = f"{column}`{name}` of `{record.name}` holds text, which programs cannot use"
+        help = (
+            f"only {'columns of ' if column else ''}numbers are loaded; write a number for each text, such as 0 and 1, "
+        )
+        help += "in another column" if column else "under another name"
     return kinds.UNKNOWN_FIELD(span, message, label=label, related=related, help=help, suggestions=instead(span, near))
 
 

@@ -103,6 +103,10 @@ def _disagree(left: Type, right: Type, operand: nodes.Operand, problem: tuple[Ty
     sign = f" {operand.op} " if operand.op in "+-" else operand.op
     before, behind = ("1", "x") if isinstance(resolve(left), Real) else ("x", "1")
     help = f"write it for each component: `[{before}{sign}{behind} for x in xs]`" if scalar and array else ""
+    rows = resolve(left)
+    if isinstance(rows, ArrayOf) and is_vector(rows.item) and _differ(rows.item, right) is None:
+        help = f"write it for each row: `[row{sign}v for row in rows]`"
+        help += "; a matrix times a vector is `[dot(row, v) for row in rows]`" if operand.op == "*" else ""
     return kinds.TUPLE_ARITHMETIC(
         operand.op_span,
         f"`{operand.op}` has no meaning between {describe(left)} and {describe(right)}",

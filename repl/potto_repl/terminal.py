@@ -210,11 +210,11 @@ class Terminal:
 
     @staticmethod
     def columns() -> int:
-        """As the terminal has it now: COLUMNS may have been right once."""
-        try:
-            return os.get_terminal_size(sys.__stdout__.fileno()).columns if sys.__stdout__ else 80
-        except (OSError, ValueError):
-            return shutil.get_terminal_size().columns
+        """As the terminal has it now: COLUMNS may have been right once. Where it does not know, it says 0."""
+        known = 0
+        with suppress(OSError, ValueError):
+            known = os.get_terminal_size(sys.__stdout__.fileno()).columns if sys.__stdout__ else 0
+        return known or shutil.get_terminal_size().columns
 
     def edit(self, text: str) -> str | None:
         """The text as the person's editor leaves it; None if that fails."""

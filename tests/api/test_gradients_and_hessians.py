@@ -142,3 +142,19 @@ def test_the_command_line_for_people(tmp_path, capsys: pytest.CaptureFixture[str
     assert lines == ["f = 0.125", "  by a: 0.5", "  by b: 0.25", "Hessian times (a=2)", "  by a: 0"]
     assert main(["deriv", str(tmp_path / "p.po"), "f", "a=0.25", "--wrt", "a"]) == 1
     assert "no value is given for `b`" in capsys.readouterr().err
+
+
+def test_a_derivative_of_a_record_has_its_fields() -> None:
+    module = potto.compile(
+        "record P(a: Real, b: Real)\nrecord Q(p: P, c: Real)\ndef f(t, p: P) Q(P(t^2*p.a, t^3), 3*t)"
+    )
+    p = {"a": 5.0, "b": 1.0}
+    found = potto.grad(module.f, ["t", "p"])(2.0, p)
+    assert (found.value.p.a, found.value.c) == (20, 6)
+    assert (found["t"].p.a, found["t"].p.b, found["t"].c) == (20, 12, 3)
+    assert (found["p"]["a"].p.a, found["p"]["b"].c) == (4, 0)
+    over = potto.grad(module.f)(np.array([1.0, 2.0]), p)
+    assert over.tangent.p.b.tolist() == [3, 12]
+    value, slope = potto.value_and_grad(module.f)(2.0, p)
+    assert (value.p.b, slope.p.b) == (8, 12)
+    assert potto.jvp(module.f, {"t": 1.0})(2.0, p).tangent.p.a == 20

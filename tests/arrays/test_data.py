@@ -16,7 +16,7 @@ def folder(tmp_path: Path) -> Path:
     (tmp_path / "people.csv").write_text("height,weight\n1.5,60\n1.75,80\n2,90\n")
     np.save(tmp_path / "grid.npy", np.arange(6.0).reshape(2, 3))
     np.savez(tmp_path / "mesh.npz", corners=np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]), h=np.array(0.25))
-    (tmp_path / "nested.json").write_text('{"a": [1, 2], "b": 3}')
+    (tmp_path / "nested.json").write_text('{"a": [1, 2], "b": 3, "rows": [{"p": {"x": 4}}, {"p": {"x": 5}}]}')
     (tmp_path / "main.po").write_text("""
 people = load("people.csv")
 grid = load("grid.npy")
@@ -26,6 +26,7 @@ tallest = max h in people.height (h)
 def misfit(a, b) sum i in 0..len(people.height)-1 ((people.weight[i] - a - b*people.height[i])^2)
 def below(t) integral [0, 3] sum h in people.height ([x < h*t]) d(x)
 corner = grid[1, 2] + mesh.corners[1, 0] + mesh.h + nested.a[1] + nested.b
+last = nested.rows.p.x[1]
 """)
     return tmp_path
 
@@ -34,6 +35,7 @@ def test_what_files_hold(folder: Path) -> None:
     module = potto.load(folder / "main.po")
     assert module.tallest.value == 2
     assert module.corner.value == 5 + 1 + 0.25 + 2 + 3
+    assert module.last.value == 5
     heights, weights = np.array([1.5, 1.75, 2]), np.array([60.0, 80, 90])
     found = potto.grad(module.misfit, ["a", "b"])(1.0, 2.0)
     rest = weights - 1 - 2 * heights

@@ -190,6 +190,8 @@ def test_an_element_that_varies() -> None:
         (lambda: M.chosen(1, 2, 2), "P0511", "the index 2 is out of range"),
         (lambda: M.matrix([[1, 2], [3, 4]], [1, 2, 3]), "P0509", "`x` has 2 elements, as `a` says, and is given 3"),
         (lambda: M.mean(3), "P0509", "an array is needed"),
+        (lambda: M.mean(range(4)), "P0509", "an array is needed, not a Python range: `list(…)` makes one of it"),
+        (lambda: M.mean((1, 2)), "P0509", "an array is needed, not a tuple of 2: `list(…)` makes one of it"),
         (lambda: M.pairs(np.zeros((2, 3))), "P0509", "`ps` holds tuples of 2, and is given rows of 3"),
     ],
 )

@@ -118,3 +118,21 @@ def test_numbers_are_decimals() -> None:
     facts = derivative_facts(library.db, file, "f")
     assert facts is not None and facts.surfaces == ("t - 0.1*(x - 0.2) = 0",)
     assert facts.integrals[0].value == "integral [0, 1] [0.1*(x - 0.2) < t]*0.1 d(x)"
+
+
+def test_fields_have_their_names() -> None:
+    """Also those of what is differentiated by another name, and of what is loaded or defined beside it."""
+    library = Library()
+    file = library.put(
+        "<text>",
+        """
+record C(f: (Real, Real), focal: Real)
+known = C((1, 2), 3)
+def f(c: C, t) integral [0, 1] [c.focal*x < c.f.1] d(x)*t*known.focal
+df = deriv(f)
+""",
+    )
+    for name in ("f", "df"):
+        facts = derivative_facts(library.db, file, name)
+        assert facts is not None and facts.surfaces == ("c.f.1 - c.focal*x = 0",)
+        assert "dc.focal" in facts.derivative and "known.focal" in facts.derivative and "c.1" not in str(facts)

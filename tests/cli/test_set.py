@@ -155,6 +155,17 @@ def test_a_table_is_an_array_of_records_by_the_names_of_its_columns(
         assert told in answered(capsys, "eval", "points.po", "total(ps, 2)", "--set", f"ps=@{file}", status=1)
 
 
+def test_a_table_stands_for_an_array_of_records_that_the_program_hands_on(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("points.po").write_text(POINTS + "mine = [Point(0, 0)]\ndef whole(k) total(mine, k)\n")
+    Path("points.json").write_text('[{"name": "a", "y": 2, "x": 1}, {"name": "b", "y": 20, "x": 10}]')
+    plain = answered(capsys, "deriv", "points.po", "total", "k=2", "--wrt", "k", "ps=@points.json")
+    handed_on = answered(capsys, "deriv", "points.po", "whole", "k=2", "--set", "mine=@points.json")
+    assert "total = 404" in plain and "whole = 404" in handed_on
+
+
 def test_a_file_that_is_wrong_is_told_in_the_words_of_the_command_line(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -6,6 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from potto.data import Array, DataMistake, Table, shape, shape_of, values_of
+from potto.data.mistakes import NO_PACKAGE
+from potto.data.values import Value
 
 
 def plain(name: str, content: bytes | str) -> Any:
@@ -15,15 +17,21 @@ def plain(name: str, content: bytes | str) -> Any:
     value = values_of(Path(name), content)
     assert not isinstance(value, DataMistake), value
     assert shape(value) == told
+    return _plain(value)
+
+
+def _plain(value: Value) -> Any:
     if isinstance(value, Table):
-        return {key: field.values.tolist() if isinstance(field, Array) else field for key, field in value.fields}
+        return {key: _plain(field) for key, field in value.fields}
     if isinstance(value, Array):
         assert value.values.dtype == "float64" and not value.values.flags.writeable and value.values.shape == value.full
     return value.values.tolist() if isinstance(value, Array) else value
 
 
 def mistake(name: str, content: bytes | str) -> DataMistake:
-    """What is wrong with the values of a file."""
-    found = values_of(Path(name), content.encode() if isinstance(content, str) else content)
+    """What is wrong with the values of a file, which is told with its shape."""
+    content = content.encode() if isinstance(content, str) else content
+    found = values_of(Path(name), content)
     assert isinstance(found, DataMistake), found
+    assert found.code == NO_PACKAGE or shape_of(Path(name), content) == found
     return found

@@ -16,7 +16,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from potto.data import Array, Columns, Number, Sizes, Table, shape_of, values_of
+from potto.data import Array, Columns, Number, Sizes, Table, shape, shape_of, values_of
 
 DTYPES = ("<f8", ">f8", "<f4", ">f2", "|b1", "|u1", "|i1", "<i2", ">i4", "<u4", "<i8", "=f8", "longdouble")
 arrays = st.sampled_from(DTYPES).flatmap(
@@ -122,6 +122,13 @@ def test_what_is_no_array_of_reals(array: npt.NDArray[Any], message: str) -> Non
 def test_what_is_not_finite(array: Any, row: int | None, column: int | None, message: str) -> None:
     found = mistake("a.npy", saved(array))
     assert (found.code, found.row, found.column, found.message) == ("P0803", row, column, message)
+    for kind in ("<f2", ">f2", "<f4", ">f4", ">f8", "g"):
+        assert mistake("a.npy", saved(np.asarray(array, kind))) == found
+    parts = np.ones(np.shape(array), [("a", "i2"), ("x", ">f4"), ("y", "f8", 2)])
+    finite = values_of(Path("a.npy"), saved(parts))
+    assert isinstance(finite, Table) and shape_of(Path("a.npy"), saved(parts)) == shape(finite)
+    parts["x"] = array
+    assert mistake("a.npy", saved(parts)).message == f"`x`: {message}"
     inside = mistake("a.npz", many(x=array))
     assert (inside.row, inside.column, inside.message) == (row, column, f"`x`: {message}")
 

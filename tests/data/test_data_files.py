@@ -114,7 +114,7 @@ def test_what_is_kept_is_bounded() -> None:
 
 def test_shapes_are_found_without_numpy_and_pillow() -> None:
     code = """
-import sys, io, zipfile, struct
+import sys, io, zipfile, zlib, struct
 from pathlib import Path
 from potto.data import shape_of, values_of
 head = "{'descr': '<f8', 'fortran_order': False, 'shape': (2,), }\\n".encode()
@@ -122,7 +122,10 @@ npy = b"\\x93NUMPY\\x01\\x00" + struct.pack("<H", len(head)) + head + bytes(16)
 file = io.BytesIO()
 with zipfile.ZipFile(file, "w") as archive:
     archive.writestr("x.npy", npy)
-png = b"\\x89PNG\\r\\n\\x1a\\n" + struct.pack(">I4sIIBBBBBI", 13, b"IHDR", 3, 2, 8, 2, 0, 0, 0, 0)
+def chunk(kind, data):
+    return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+png = b"\\x89PNG\\r\\n\\x1a\\n" + chunk(b"IHDR", struct.pack(">IIBBBBB", 3, 2, 8, 2, 0, 0, 0))
+png += chunk(b"IDAT", zlib.compress(bytes(20))) + chunk(b"IEND", b"")
 files = {"a.csv": b"x\\n1", "a.json": b"[1]", "a.npy": npy, "a.npz": file.getvalue(), "a.png": png, "a.tsv": b"1"}
 for name, content in files.items():
     print(shape_of(Path(name), content))

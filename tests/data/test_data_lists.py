@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 from typing import Any
 
 import pytest
 from data_files import mistake, plain
 from hypothesis import given
 from hypothesis import strategies as st
+
+from potto.data import Table, shape_of, values_of
 
 reals = st.floats(allow_nan=False, allow_infinity=False)
 numbers = st.one_of(reals, st.integers(-(2**53), 2**53))
@@ -40,6 +43,25 @@ def test_objects_in_a_list_are_rows(count: int, row: dict[str, Any]) -> None:
     assert plain("d.json", json.dumps([row] * count)) == {name: [entry] * count for name, entry in row.items()}
 
 
+@given(st.integers(1, 3), st.integers(1, 2), st.dictionaries(st.sampled_from("abc"), boxes, min_size=1))
+def test_objects_within_objects_are_tables_within_tables(count: int, inner: int, row: dict[str, Any]) -> None:
+    data = [{"p": row, "q": [row] * inner, "name": "a"}] * count
+    found = plain("d.json", json.dumps({"rows": data}))["rows"]
+    columns = {name: [entry] * count for name, entry in row.items()}
+    assert found == {"p": columns, "q": {name: [[entry] * inner] * count for name, entry in row.items()}}
+
+
+def test_texts_are_left_out() -> None:
+    rows = [
+        {"id": "a", "x": 1, "at": {"unit": "mm", "y": 2}, "tags": ["u"]},
+        {"id": None, "x": 3, "at": {"unit": "m", "y": 4}, "tags": []},
+    ]
+    found = values_of(Path("d.json"), json.dumps(rows).encode())
+    assert isinstance(found, Table) and found.texts == ("id", "tags")
+    assert isinstance(at := found["at"], Table) and at.texts == ("unit",)
+    assert plain("d.json", json.dumps(rows)) == {"x": [1, 3], "at": {"y": [2, 4]}}
+
+
 @given(
     st.recursive(
         st.one_of(numbers, st.none(), st.booleans(), st.text(max_size=2)),
@@ -47,10 +69,6 @@ def test_objects_in_a_list_are_rows(count: int, row: dict[str, Any]) -> None:
     )
 )
 def test_any_json_is_answered(data: Any) -> None:  # fmt: skip
-    from pathlib import Path
-
-    from potto.data import shape_of
-
     shape_of(Path("d.json"), json.dumps(data, indent=1).encode())
 
 
@@ -70,7 +88,18 @@ def test_any_json_is_answered(data: Any) -> None:  # fmt: skip
         ('[{"x": 1},\n{"y": 2}]', "P0803", 2, 2, "line 2, `[1]`: the object has `y`, and the first one `x`"),
         ('[{"x": 1},\n7]', "P0803", 2, 2, "line 2, `[1]`: this stands among objects"),
         ("[{}]", "P0805", None, None, "the file holds no values: its objects are empty"),
-        ('{"x": {"y": 1}}', "P0803", 1, None, "line 1, `x`: this is an object, not a number"),
+        ('{"x": [{"y": 1}, 2]}', "P0803", 1, 2, "line 1, `x[1]`: this stands among objects"),
+        (
+            '[{"p": {"y": 1}},\n{"p": {"z": 2}}]',
+            "P0803",
+            2,
+            2,
+            "line 2, `[1].p`: the object has `z`, and the first one",
+        ),
+        ('[{"p": [{"y": [1]}]},\n{"p": [{"y": [1,\n null]}]}]', "P0803", 2, 1, "line 2, `[1].p[0].y`: the list has 2"),
+        ('[{"p": [{"y": [1]}]},\n{"p": [{"y": [\nnull]}]}]', "P0803", 3, 1, "line 3, `[1].p[0].y[0]`: this is null"),
+        ('[{"x": "a"},\n{"x": "2"}]', "P0803", 1, 1, "line 1, `[0].x`: `a` is a text, not a number"),
+        ('[{"x": 1, "y": "1"}]', "P0803", 1, 1, "line 1, `[0].y`: `1` is a text, not a number"),
         ('{"x": [1], "y": [[]]}', "P0803", 1, 1, "line 1, `y[0]`: the list is empty"),
         ("[]", "P0803", 1, None, "line 1: the list is empty"),
         ("{}", "P0805", None, None, "the file holds no values: its object is empty"),

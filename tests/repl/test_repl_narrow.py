@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import re
 
 import pytest
 from potto_repl.paint import Look, painted
 from potto_repl.registry import COMMANDS
 from potto_repl.start import greeting
+from potto_repl.terminal import Terminal
 
 from potto.reports.excerpt import width
 from potto.reports.render import broken
@@ -121,3 +123,9 @@ def test_numbers_stay_whole(talk, columns):
         assert all(width(line) <= columns for line in shown), shown
         numbers = re.findall(r"[\d.]*\d(?:e-?\d+)?(?: ± [\d.]+(?:e-?\d+)?)?", reply.parts[0].plain())
         assert all(any(number in line for line in shown) for number in numbers)
+
+
+def test_a_terminal_that_does_not_know_its_width(monkeypatch):
+    monkeypatch.setattr("os.get_terminal_size", lambda *_: os.terminal_size((0, 0)))
+    monkeypatch.delenv("COLUMNS", raising=False)
+    assert Terminal.columns() == 80

@@ -145,6 +145,10 @@ def test_a_line_that_is_indented_more_goes_on() -> None:
         ("u, v = (1, 2)", "write `pair = …`, then `u = fst pair` and `v = snd pair`"),
         ("(u, v) = (1, 2)", "write `pair = …`, then `u = fst pair` and `v = snd pair`"),
         ("u, v, w = (1, 2, 3)", "write `u = let (u, v, w) = … in u`; `v = let (u, v, w) = … in v`"),
+        ("d = c with (a.b = 1)", "write `c with a = (c.a with b = …)`"),
+        ("d = c with (x = 2, a.b = 1)", "write `c with a = (c.a with b = …)`"),
+        ("record R(from: Real)", "choose another name, such as `from_`"),
+        ("record R(x: Real, for: Real)", "choose another name, such as `for_`"),
     ],
 )
 def test_the_hint_is_what_to_write(text: str, help: str) -> None:

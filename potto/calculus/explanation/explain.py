@@ -20,7 +20,7 @@ from potto.calculus.differentiation.dual import Differentiator
 from potto.calculus.differentiation.higher_order import moving_deltas
 from potto.calculus.differentiation.level_sets import level_set
 from potto.calculus.explanation.continuity import continuous
-from potto.calculus.explanation.fields import named_fields, parameter_types
+from potto.calculus.explanation.fields import fields_of
 from potto.calculus.explanation.layout import DerivativeText, IntegralText, SurfaceText
 from potto.calculus.explanation.plain_names import plainly_named
 from potto.calculus.explanation.readable import Progress, in_decimals, readable
@@ -81,18 +81,13 @@ def explain_derivative(db: Database, file: str, name: str) -> DerivativeText:
             shown,
             format_type(type),
             resolve,
-            _fields(db, known),
+            fields_of(db, known),
             db.give_way,
         )
         return replace(text, by=name)
     given = _applied(term, found.type)
     type_text = format_type(derivative_type(found.type))
-    return describe(given, name, type_text, resolve, _fields(db, found.type), db.give_way)
-
-
-def _fields(db: Database, type: Type | None) -> Rewrite:
-    known = parameter_types(type) if type is not None else {}
-    return lambda term: named_fields(db, term, known)
+    return describe(given, name, type_text, resolve, fields_of(db, found.type), db.give_way)
 
 
 def _original(term: Term, name: str, resolve: Resolve) -> tuple[Term, str] | None:

@@ -1,11 +1,12 @@
 """Parts of records by the names of their fields.
 
-Owns `named_fields`. Core terms know places only: `camera.focal` is part 1 of a tuple, and programs can't write it so.
+Owns `named_fields`, and `fields_of` for the parameters of a function. Core terms know places only: `camera.focal` is
+part 1 of a tuple, and programs can't write it so.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 from potto.core.printer import format_term
 from potto.core.terms import (
@@ -29,6 +30,12 @@ from potto.core.terms import (
 from potto.query import Database
 from potto.types import Type, groups_of, interface
 from potto.types.types import ArrayOf, Function, TupleOf, resolve, result_of
+
+
+def fields_of(db: Database, type: Type | None) -> Callable[[Term], Term]:
+    """What gives the fields of records their names in a term over the parameters of a function of a type."""
+    known = parameter_types(type) if type is not None else {}
+    return lambda term: named_fields(db, term, known)
 
 
 def parameter_types(type: Type) -> dict[str, Type]:

@@ -43,7 +43,7 @@ def part_markdown(part: PartSymbol) -> str:
     path = Path(part.data)
     content = read(path)
     value = content if isinstance(content, DataMistake) else values_of(path, content)
-    column = dict(value.fields).get(part.name) if isinstance(value, Table) else None
+    column = value[part.path] if isinstance(value, Table) else None
     held = "" if column is None else f"\n\n```\n{summary(column)}\n```"
     return f"{shown}column of `{path.name}`{held}"
 

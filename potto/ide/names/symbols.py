@@ -81,6 +81,14 @@ class PartSymbol(Struct, frozen=True):
         record = self.whole.record if isinstance(self.whole, TupleOf) else None
         return record.file if record is not None and "." in record.name else None
 
+    @property
+    def path(self) -> str:
+        """Its name within the file; of a column of a record within that, with the names on the way to it."""
+        record = self.whole.record if isinstance(self.whole, TupleOf) else None
+        file = "" if self.data is None else self.data.replace("\\", "/").rpartition("/")[2]
+        within = "" if record is None else record.name.removeprefix(file).removeprefix(".")
+        return f"{within}.{self.name}" if within else self.name
+
 
 Symbol = LocalSymbol | DefinitionSymbol | ModuleSymbol | BuiltinSymbol | MeasureSymbol | PartSymbol
 

@@ -1,7 +1,7 @@
 """Records as answers: tuples that know the names of their parts, and are shown as programs write them.
 
-Owns `Named`, and `WithFields` for answers that may be such. What is evaluated is tuples; the type of an answer says
-which of them are records.
+Owns `Named`, which `named` makes by a type and `alike` of another one, and `WithFields` for answers that may be such.
+What is evaluated is tuples; the type of an answer says which of them are records.
 """
 
 from __future__ import annotations
@@ -37,6 +37,11 @@ class Named(tuple[Any, ...]):
     def written(self, parts: Iterable[str]) -> str:
         """`Camera(eye=(0, 0, -5), focal=1.5)`, of its parts as texts."""
         return f"{self.record}({', '.join(f'{n}={part}' for n, part in zip(self.fields, parts, strict=True))})"
+
+
+def alike(whole: tuple[Any, ...], parts: Iterable[Any]) -> tuple[Any, ...]:
+    """Other parts with the names that a tuple has, if any."""
+    return Named(whole.record, whole.fields, parts) if isinstance(whole, Named) else tuple(parts)
 
 
 class WithFields:

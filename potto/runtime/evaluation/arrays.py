@@ -65,9 +65,8 @@ def _size(size: Value) -> int:
         raise PottoError([RAGGED(errors.NOWHERE, message, help="evaluate them one by one")])
     count = float(flat[0])
     if count != np.rint(count) or not np.isfinite(count):
-        raise PottoError(
-            [NO_PLACE(errors.NOWHERE, f"an array cannot have {count!r} elements: that is not a whole number")]
-        )
+        message = f"an array cannot have {count!r} elements: that is not a whole number"
+        raise PottoError([NO_PLACE(errors.NOWHERE, message, help="use `floor` or `ceil` to make it one")])
     if count > MOST_ELEMENTS:
         raise PottoError([NO_PLACE(errors.NOWHERE, f"an array of {count:.0f} elements is too large")])
     return max(0, int(count))
