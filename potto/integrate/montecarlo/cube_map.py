@@ -12,7 +12,7 @@ surfaces is missed.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Container, Mapping, Sequence
+from collections.abc import Callable, Container, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -95,7 +95,8 @@ class Chart(Struct, frozen=True):
         lo, hi, rows = frame_rows(level, values)
         with np.errstate(invalid="ignore", over="ignore"):
             cuts = [label_of(lo, hi, row.x) for row in rows if row.cut >= 0]
-            inside = [np.where((cut > 0) & (cut < 1), cut, 1.0) for cut in cuts]
+        inside = [np.fmin(np.fmax(cut, 0.0), 1.0) for cut in cuts]
+        inside = [cut for cut in inside if cut.max() > 0 and cut.min() < 1]
         return crowd(ascending(inside), self.share, u) if inside else (u, None)
 
     def above(self, surface: Term, env: dict[str, Value], n: int) -> Bools:
@@ -184,10 +185,12 @@ def label_of(lo: Cell, hi: Cell, x: Number) -> Array:
         finite = np.divide(x - low, high - low)
         if np.isfinite(a).all() and np.isfinite(b).all():
             return finite
-        up, down = np.isinf(b), np.isinf(a)
-        whole = (1 + 2 * x / (1 + np.sqrt(1 + 4 * x * x))) / 2  # the w of w/(1 - w^2) = x, from (-1, 1) to (0, 1)
-        one = np.where(up, (x - a) / (1 + (x - a)), 1 / (1 + (b - x)))
-        return np.where(up & down, whole, np.where(up | down, one, finite))
+        return _by_ends(
+            a, b, finite,
+            lambda: (x - a) / (1 + (x - a)),
+            lambda: 1 / (1 + (b - x)),
+            lambda: (1 + 2 * x / (1 + np.sqrt(1 + 4 * x * x))) / 2,  # w/(1 - w^2) = x, w from (-1, 1) to (0, 1)
+        )  # fmt: skip
 
 
 def stretch(lo: Cell, hi: Cell, u: Array, k: int) -> tuple[Cell, Cell]:
@@ -201,16 +204,31 @@ def stretch(lo: Cell, hi: Cell, u: Array, k: int) -> tuple[Cell, Cell]:
     a, b = np.minimum(low, high), np.maximum(low, high)
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
         w = 2 * u - 1
+        x = _by_ends(a, b, low + (high - low) * u, lambda: a + u / (1 - u), lambda: b - (1 - u) / u,
+                     lambda: w / (1 - w * w))  # fmt: skip
+        slope = _by_ends(a, b, b - a, lambda: 1 / (1 - u) ** 2, lambda: 1 / (u * u),
+                         lambda: 2 * (1 + w * w) / (1 - w * w) ** 2)  # fmt: skip
         up, down = np.isinf(b), np.isinf(a)
-        one = np.where(up, a + u / (1 - u), b - (1 - u) / u)
-        x = np.where(up & down, w / (1 - w * w), np.where(up | down, one, low + (high - low) * u))
-        ends = np.where(up, 1 / (1 - u) ** 2, 1 / (u * u))
-        slope = np.where(up & down, 2 * (1 + w * w) / (1 - w * w) ** 2, np.where(up | down, ends, b - a))
         label = np.where(up | down, np.where(np.isinf(high), 0.0, 1.0), u)  # a bound's motion carries all points along
     t = tuple(_mix(lo.t, hi.t, d, label) for d in range(k))
     finite = ~(up | down)
     rate = tuple(None if r is None else np.where(finite, r, 0.0) for r in rate)
     return Cell(x, None, t), Cell(sign * slope, None, rate)
+
+
+def _by_ends(
+    low: Array, high: Array, finite: Array,
+    up: Callable[[], Array], down: Callable[[], Array], both: Callable[[], Array],
+) -> Array:  # fmt: skip
+    """What is `finite`, or worked out for ranges without an upper end, a lower one, or both, where there are any."""
+    over, under = np.isinf(high), np.isinf(low)
+    found = finite
+    for here, worked_out in ((over & ~under, up), (under & ~over, down), (over & under, both)):
+        if here.all():
+            return worked_out()
+        if here.any():
+            found = np.where(here, worked_out(), found)
+    return found
 
 
 def _unit(low: Number, high: Number) -> bool:

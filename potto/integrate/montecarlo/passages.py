@@ -14,7 +14,7 @@ from potto.core.terms import App, Branch, Const, If, Prim, Term, function_of, po
 from potto.integrate.decomposition.meetings import as_array
 from potto.integrate.montecarlo.cube_map import Chart
 from potto.integrate.pieces import still
-from potto.kernels.cells import Array, Bools, Cell, Ints
+from potto.kernels.cells import Array, Bools, Cell, Ints, Number
 from potto.primitives import PRIMITIVES
 
 # How far from a root, in labels, a surface has the signs that it goes from and to; where they are one sign, nearer.
@@ -31,15 +31,19 @@ class Passage(Struct, dict=True):
     term: Term
     number: int
 
-    def through(self, labels: list[Array | None], pivot: int, slope: Array, asked: Bools) -> Bools:
+    def through(
+        self, labels: list[Array | None], pivot: int, slope: Array, speed: Number | None, asked: Bools
+    ) -> Bools:
         """Whether phi goes through 0, the way its slope says, at points along the pivot: (n,), of those asked for.
 
-        Where it has one sign on either side it only touches 0, unless another root is nearer than that. Where it is
+        speed: of the pivot by its label; where the pivot has no end, slopes by labels have none either.
+        Where phi has one sign on either side it only touches 0, unless another root is nearer than that. Where it is
         smooth its slope is next to nothing there, so that others are looked at only if the steepest touches.
         """
         way, found, rows = np.broadcast_to(np.sign(slope), asked.shape), asked.copy(), np.nonzero(asked)[0]
         if self.smooth and rows.size:
-            steep = np.abs(np.broadcast_to(slope, asked.shape)[rows])
+            steep = np.abs(np.broadcast_to(slope if speed is None else slope / speed, asked.shape)[rows])
+            steep[np.isnan(steep)] = 0.0
             top = rows[steep.argmax()]
             few = np.append(rows[steep < TOUCHING * steep.max()], top)
             found[few] = self.changes(labels, pivot, way, few)
@@ -66,7 +70,7 @@ class Passage(Struct, dict=True):
         assert u is not None
         moved = [*labels[:pivot], u + side, *labels[pivot + 1 :]]
         start = self.chart.start(u.size, 0)
-        point = self.chart.place(start, moved, 0, self.number + 1, directions=0, crowding=range(pivot))
+        point = self.chart.place(start, moved, 0, self.number + 1, directions=0)
         function = function_of(self.term)
         machine = self.chart.machine.with_directions(0).tracking()
         value = machine.evaluate(function, {name: still(point.env[name]) for name in function.params}, None)

@@ -33,6 +33,7 @@ from potto.integrate.decomposition.cuts import frame_rows
 from potto.integrate.decomposition.meetings import Row, as_array
 from potto.integrate.decomposition.sections import searched_rows
 from potto.integrate.events import UNKNOWN_JUMP
+from potto.integrate.levels import LevelPlan
 from potto.integrate.montecarlo.cube_map import Chart, Point, label_of
 from potto.integrate.montecarlo.lines import End, Line, label_name, leaving, line, offset
 from potto.integrate.montecarlo.passages import ASIDE, Passage
@@ -144,8 +145,7 @@ class Surface(Struct, dict=True):
             return Sums.joined([self.crossing(u[i : i + LINES], pivot) for i in range(0, n, LINES)])
         labels: list[Array | None] = list(u.T)
         labels.insert(pivot, None)
-        before = self.chart.place(self.chart.start(n, k), labels, 0, pivot, crowding=range(pivot))
-        lo, hi, roots, weight = self.roots(before, labels, pivot, along, n)
+        lo, hi, roots, weight = self.roots(labels, pivot, along, n)
         terms = [root for cut in along.plan.level.cuts for root in cut.roots or ()]
         t, et = nothing.t, nothing.et
         seen: list[Array] = []
@@ -165,31 +165,32 @@ class Surface(Struct, dict=True):
         return Sums(nothing.v, nothing.e, t, et)
 
     def roots(
-        self, before: Point, labels: list[Array | None], pivot: int, along: Line, n: int
+        self, labels: list[Array | None], pivot: int, along: Line, n: int
     ) -> tuple[Cell, Cell, list[Row], Array | None]:
         """The bounds of the pivot and where the surface is crossed along it, nan for those that are not there.
 
         Closed forms come first, in the order of the line's cuts.
-        The label of the surface's innermost variable is crowded where the pivot is further out, and put into `labels`;
-        with what weight, comes last.
+        Labels further out than the pivot are crowded, and that of the surface's innermost variable where the pivot is
+        further out than it: they are put into `labels`, once for all that is asked at these points; with what weight,
+        comes last.
         """
         machine = self.machine.with_directions(0)
-        point = Point({name: still(v) for name, v in before.env.items()}, Cell(1.0))
-        weight: Array | None = None
-        for number in range(pivot + 1, self.number + 1):
+        env = {name: still(value) for name, value in self.chart.env.items()}
+        point, weight = Point(env, Cell(1.0)), None
+        for number, level in enumerate(self.chart.plan.levels[: self.number + 1]):
             u = labels[number]
             if u is None:
                 continue
-            level = self.chart.plan.levels[number]
-            if number == self.number and number not in along.follows:
-                ends = leaving(self.chart.plan.term, self.term, pivot, number)
-                if point.env.keys() >= set(ends.frame.params):  # others follow the pivot
-                    u, weight = self.chart.crowded(ends, point.env, u)
-                    labels[number] = u
-            if number not in along.follows:
-                point = self.chart.place(point, labels, number, number + 1, directions=0)
-            else:
+            if number in along.follows:
                 point.env[label_name(level.variable)] = Cell(offset(self.ends[number], u))
+                continue
+            ends: LevelPlan | None = level if number < pivot else None
+            if number == self.number > pivot:
+                ends = leaving(self.chart.plan.term, self.term, pivot, number)
+            if ends is not None and point.env.keys() >= set(ends.frame.params):  # others follow the pivot
+                labels[number], more = self.chart.crowded(ends, point.env, u)
+                weight = more if weight is None else weight if more is None else weight * more
+            point = self.chart.place(point, labels, number, number + 1, directions=0)
         assert along.plan is not None
         values = machine.tracking().evaluate(along.plan.frame, {p: point.env[p] for p in along.plan.frame.params}, None)
         assert isinstance(values, tuple)
@@ -215,7 +216,9 @@ class Surface(Struct, dict=True):
             smooth = np.isfinite(slopes).all(axis=0) & (steep > 0) & (np.abs(phi) <= OFF * steep)
             rates = slopes[:k] / (steep * ((slopes[k:] / steep) ** 2).sum(axis=0))
             if self.passage is not None:  # at a pole its slope has the sign of neither side, where it touches of one
-                smooth &= self.passage.through(labels, pivot, slopes[j], inside & smooth)
+                along = point.env[self.chart.plan.levels[pivot].variable]
+                assert isinstance(along, Cell)
+                smooth &= self.passage.through(labels, pivot, slopes[j], along.t[j], inside & smooth)
         odd = inside & ~smooth
         if odd.any():
             rates = np.where(odd, self.beside(labels, pivot, marked, point, root), rates)
@@ -286,9 +289,9 @@ class Surface(Struct, dict=True):
 
     def placed(self, labels: list[Array | None], pivot: int, marked: dict[int, int], n: int) -> Point:
         """Points with every variable at its label, those of the axes moving. Cuts along the pivot's way are not known
-        before it is, so that only further out, and further in, labels are crowded."""
+        before it is; labels further out are crowded already (`roots`), those further in are here."""
         wide = self.machine.directions + len(marked)
-        crowding = (*range(pivot), *range(self.number + 1, self.stop))
+        crowding = range(self.number + 1, self.stop)
         start = self.chart.start(n, wide)
         return self.chart.place(start, labels, 0, self.stop, marked, self.held, wide, crowding)
 
