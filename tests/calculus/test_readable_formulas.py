@@ -104,6 +104,28 @@ def test_a_sign_that_conditions_tell_is_not_written() -> None:
     assert explain_derivative(library.db, file, "f").tangent == "da*[a > 0 and a < 0.5]"
 
 
+def test_what_both_sides_of_a_choice_share_stands_before_it() -> None:
+    library = Library()
+    file = library.put("<text>", "def f(t, s) integral [0, 1] (if [x < 1/2] then x*exp(-t*x) else 3*exp(-t*x)) d(x)\n")
+    shown = explain_derivative(library.db, file, "f").tangent
+    assert shown == "-(integral [0, 1] x*exp(-t*x)*(if [x < 0.5] then x else 3)*dt d(x))"
+
+
+def test_a_choice_by_a_sign_is_a_function_of_the_size() -> None:
+    """The root of x^3 = a*b is chosen by its sign, and so is the slope there."""
+    library = Library()
+    file = library.put(
+        "<text>", "def f(a, b) integral [0, 9] [x^3 < a*b] d(x)\ndef g(a, b) integral [a, b] [x^3 < a*b] d(x)\n"
+    )
+    shown = explain_derivative(library.db, file, "f").tangent
+    assert shown == "(b*da + a*db)/(3*abs(a*b)^(2/3))*[a*b > 0 and a*b < 729]"
+    fifth = library.put("h", "def h(t) integral [-9, 9] [x^5 > t - 1]*x d(x)\n")
+    shown = explain_derivative(library.db, fifth, "h").tangent
+    assert shown == "-sign(t - 1)*dt/(5*abs(t - 1)^(3/5))*[t > -59048 and t < 59050]"
+    surfaces = explain_derivative(library.db, file, "g").integrals[0].surfaces
+    assert surfaces[0].roots == ("x = abs(a*b)^(1/3)*sign(a*b)",)
+
+
 def test_a_root_of_a_product_is_one_of_squares() -> None:
     x, a, r = var("x"), var("a"), var("r")
     product = mul(sub(add(r, a), x), sub(add(r, x), a))

@@ -56,3 +56,10 @@ def test_lines_break_before_the_signs_of_the_outermost_sum() -> None:
 def test_a_product_without_a_long_sum_breaks_before_a_factor() -> None:
     first, second = broken("", "a" * 30 + "·(x − y)²·" + "b" * 30, 50)
     assert first.endswith("(x − y)²") and second.strip() == "·" + "b" * 30
+
+
+def test_a_choice_breaks_before_its_sides_and_a_size_stays_whole() -> None:
+    first, second, third = broken("", "(if x < t + 1 then " + "a" * 40 + " + b else " + "c" * 40 + ")·d", 60)
+    assert first.endswith("t + 1") and second.lstrip().startswith("then a") and third.lstrip().startswith("else c")
+    first, second = broken("", "(" + "a" * 38 + " + |x − t|·" + "b" * 12 + ")", 50)
+    assert second.lstrip().startswith("+ |x − t|")

@@ -1,8 +1,9 @@
 """Iverson brackets as conditions, in as few and as plain comparisons as they can be told.
 
-Owns `Condition`, `conditions`, `fewer`, `between`, `plainer`, `sign_where` and `bracket`. A root is compared by
-squares, factors that do not change a sign are left out, and so is what another condition implies. What two conditions
-hold between numbers stands between them: `-1 < c + x < 0` is c < -x and c + x + 1 > 0.
+Owns `Condition`, `conditions`, `fewer`, `between`, `plainer`, `sign_where`, `constant`, `bracket`. A root is compared
+by squares or by what it is the root of, factors that do not change a sign are left out, and so is what another
+condition implies. What two conditions hold between numbers stands between them: `-1 < c + x < 0` is c < -x and
+c + x + 1 > 0.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from msgspec import Struct
 
 from potto.calculus.algebra.ranges import range_of
 from potto.calculus.algebra.rational_form import as_term, normal
-from potto.core.polynomials import Polynomial, shared_by, without
+from potto.core.polynomials import Polynomial, number, shared_by, without
 from potto.core.printer import format_term
 from potto.core.terms import (
     ONE,
@@ -176,6 +177,14 @@ def sign_where(known: Sequence[Condition], inner: Term) -> tuple[int, list[Condi
     return None
 
 
+def constant(term: Term) -> Fraction | None:
+    """The number that a term is, whatever its variables are."""
+    found = normal(term)
+    if found is None or not {*found.top, *found.below} <= {()}:
+        return None
+    return Fraction(found.top.get((), 0)) / Fraction(found.below[()])
+
+
 def opposite(first: Condition, second: Condition) -> bool:
     """Whether one surface is the other with its sign turned."""
     found = normal(add(first.surface, second.surface))
@@ -188,12 +197,12 @@ def _plain(item: Condition) -> list[Condition]:
     if found is None:
         return [item]
     if found.whole and not set(found.top) - {()}:  # a number
-        number = found.top.get((), Fraction(0))
-        return [] if number > 0 or (number == 0 and not item.strict) else [NEVER]
+        value = found.top.get((), Fraction(0))
+        return [] if value > 0 or (value == 0 and not item.strict) else [NEVER]
     if not found.top:
         return [item]
     if found.whole:
-        without_root = _squared(found.top, item.strict)
+        without_root = _squared(found.top, item.strict) or _odd_root(found.top, item.strict)
         if without_root is not None:
             return [each for one in without_root for each in _plain(one)]
     if len(found.top) == 1:
@@ -226,6 +235,25 @@ def _squared(form: Polynomial, strict: bool) -> list[Condition] | None:
     return [Condition(sub(inside, inside_square(rest)), strict)] if range_of(rest).hi <= 0 else None
 
 
+def _odd_root(form: Polynomial, strict: bool) -> list[Condition] | None:
+    """k*sign(u)*abs(u)^(1/n) > a number, by u itself."""
+    offset = form.get((), Fraction(0))
+    match [(monomial, scale) for monomial, scale in form.items() if monomial]:
+        case [(((a, 1), (b, 1)), scale)]:
+            root, sign = (a, b) if isinstance(a, Prim) and a.op == "pow" else (b, a)
+        case _:
+            return None
+    match root, sign:
+        case Prim(op="pow", args=(Prim(op="abs", args=(u,)), power)), Prim(op="sign", args=(v,)) if u == v:
+            part, value = constant(power), -Fraction(offset) / Fraction(scale)
+        case _:
+            return None
+    bound = None if part is None or part.numerator != 1 else number(value * abs(value) ** (part.denominator - 1))
+    if bound is None:
+        return None
+    return [Condition(sub(u, bound) if scale > 0 else sub(bound, u), strict)]
+
+
 def inside_square(term: Term) -> Term:
     """Its square, written out."""
     found = normal(mul(term, term))
@@ -250,7 +278,7 @@ def _without_even(item: Condition, top: Polynomial, below: Polynomial) -> list[C
 
 def _excludes(first: Condition, second: Condition) -> bool:
     """Whether two conditions never hold together: their surfaces add up to a number that is not above 0."""
-    total = _number(add(first.surface, second.surface))
+    total = constant(add(first.surface, second.surface))
     if total is None:
         return False
     return total < 0 or (total == 0 and (first.strict or second.strict))
@@ -258,15 +286,7 @@ def _excludes(first: Condition, second: Condition) -> bool:
 
 def _implies(first: Condition, second: Condition) -> bool:
     """Whether the second holds wherever the first does: its surface is the other's and a number that is not below 0."""
-    offset = _number(sub(second.surface, first.surface))
+    offset = constant(sub(second.surface, first.surface))
     if offset is None:
         return False
     return offset > 0 or (offset == 0 and (first.strict or not second.strict))
-
-
-def _number(term: Term) -> Fraction | None:
-    """The number that a term is."""
-    found = normal(term)
-    if found is None or not found.whole or set(found.top) - {()}:
-        return None
-    return Fraction(found.top.get((), Fraction(0)))

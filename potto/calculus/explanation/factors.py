@@ -12,7 +12,7 @@ from fractions import Fraction
 from msgspec import Struct
 
 from potto.calculus.algebra.ranges import range_of
-from potto.calculus.explanation.brackets import NEVER, Condition, bracket, conditions, fewer, sign_where
+from potto.calculus.explanation.brackets import NEVER, Condition, bracket, conditions, constant, fewer, sign_where
 from potto.core.polynomials import number
 from potto.core.printer import format_term
 from potto.core.terms import (
@@ -40,6 +40,7 @@ _HALF = Fraction(1, 2)
 _PLAIN, _TANGENT, _DELTA = range(3)
 _DIGITS = 15
 _LARGEST = 64  # of an exponent
+_PARTS = range(3, 13)  # of roots that are told as exponents
 
 
 class Factors(Struct):
@@ -82,6 +83,10 @@ def _collect(term: Term, exponent: Fraction, into: Factors) -> None:
             value.is_integer() and abs(value) <= _LARGEST and exponent.denominator == 1
         ):
             _collect(base, exponent * int(value), into)
+        case Prim(op="pow", args=(Prim(op="abs") as base, power)) if (
+            exponent.denominator == 1 and (part := constant(power)) is not None and part.denominator in _PARTS
+        ):
+            into.times(base, exponent * part)
         case Prim(op="sqrt", args=(inner,)) if exponent.denominator == 1:
             _collect(inner, exponent / 2, into)
         case Prim(op="add", args=args) if exponent.denominator == 1 and all(map(_negative, args)):
@@ -199,7 +204,7 @@ def _raised(base: Term, exponent: Fraction) -> Term:
         return prim("sqrt", base)
     if exponent.denominator == 2:
         return mul(*([_raised(base, exponent - _HALF)] if exponent > _HALF else []), prim("sqrt", base))
-    return base if exponent == 1 else pow_(base, const(float(exponent)))
+    return base if exponent == 1 else pow_(base, number(exponent) or const(float(exponent)))
 
 
 def _place(base: Term, tangents: frozenset[str]) -> int:

@@ -15,6 +15,7 @@ from msgspec import Struct
 
 from potto.calculus.algebra.ranges import Range, range_of
 from potto.calculus.algebra.rational_form import Rational, normal
+from potto.calculus.explanation.alternatives import in_one
 from potto.calculus.explanation.brackets import Condition, between, conditions, fewer, opposite, plainer
 from potto.calculus.explanation.brackets import bracket as bracket_of
 from potto.calculus.explanation.factors import Factors, factored, is_tangent, written
@@ -172,10 +173,13 @@ class _Work:
                 known = conditions(node)
                 if known is not None:
                     return bracket_of(fewer(known))
-                if len(node.coordinates) == 1:
-                    (item,) = between([Condition(node.surface, node.strict)])
-                    return branch((item.surface,), item.strict, node.then, node.orelse)
-                return node
+                if len(node.coordinates) > 1:
+                    return in_one(node, self.tangents, self.inside, self._cost)
+                (item,) = between([Condition(node.surface, node.strict)])
+                whole = branch((item.surface,), item.strict, node.then, node.orelse)
+                return in_one(whole, self.tangents, self.inside, self._cost) if isinstance(whole, Branch) else whole
+            case If():
+                return in_one(node, self.tangents, self.inside, self._cost)
             case Prim(op="hypot"):
                 return _length(node)
             case Integral(body=Prim(op="neg", args=(inner,))):

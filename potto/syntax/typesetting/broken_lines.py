@@ -1,7 +1,7 @@
 """Long formulas over several lines.
 
-Owns `broken`. A line breaks before the signs of a sum, the outermost one or that between the farthest parentheses;
-where there is no long one, before a factor.
+Owns `broken`. A line breaks before the sides of a choice or the signs of a sum, the outermost one or that between the
+farthest parentheses; where there is no long one, before a factor.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 from itertools import pairwise
 
 _SIGNS = (" + ", " - ", " − ")
+_SIDES = (" then ", " else ")
 _FACTORS = ("·", "*")
 _OUTSIDE = -1
 _SHORT = 40  # characters between parentheses that stay together
@@ -39,20 +40,26 @@ def _broken(line: str, start: int, indent: int, width: int, deep: int) -> list[s
 
 
 def _places(text: str) -> list[int]:
-    """Where to break: before the signs of one sum, or before factors."""
+    """Where to break: before the sides of a choice or the signs of one sum, or before factors."""
+    choices: dict[int, list[int]] = {}
     sums: dict[int, list[int]] = {}
     factors: dict[int, list[int]] = {}
     ends: dict[int, int] = {}
     around = [_OUTSIDE]
     for i, char in enumerate(text):
-        if char in "([{":
+        if char == "|" and around[-1] != _OUTSIDE and text[around[-1]] == "|":
+            ends[around.pop()] = i
+        elif char in "([{|":
             around.append(i)
         elif char in ")]}" and len(around) > 1:
             ends[around.pop()] = i
+        elif i and text.startswith(_SIDES, i):
+            choices.setdefault(around[-1], []).append(i)
         elif i and text.startswith(_SIGNS, i):
             sums.setdefault(around[-1], []).append(i)
         elif i and char in _FACTORS:
             factors.setdefault(len(around), []).append(i)
+    sums |= choices  # a choice reaches further than a sum
     if _OUTSIDE in sums:
         return sums[_OUTSIDE]
     long = [(ends.get(at, len(text)) - at, places) for at, places in sums.items()]

@@ -1,0 +1,104 @@
+"""A choice between two formulas, told in one.
+
+Owns `in_one`: the side that a known condition takes, what both sides share in front of the choice, and a function of
+abs(u) where the sign of u chooses between one of u and the same of -u.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from fractions import Fraction
+
+from potto.calculus.algebra.rational_form import normal
+from potto.calculus.explanation.brackets import constant
+from potto.calculus.explanation.factors import Factors, factored, written
+from potto.core.terms import ZERO, Branch, If, Prim, Term, add, children, mul, neg, prim, rebuild, sub, transform
+
+Cost = Callable[[Term], int]
+
+
+def in_one(node: If | Branch, tangents: frozenset[str], inside: frozenset[str], cost: Cost) -> Term:
+    """The shortest way to write a choice. inside: variables on which no sign may depend."""
+    known = _holds(node.condition) if isinstance(node, If) else None
+    if known is not None:
+        return node.then if known else node.orelse
+    whole = _of_size(node, tangents, inside) if isinstance(node, Branch) and len(node.coordinates) == 1 else None
+    return min((node, _apart(node, tangents)) if whole is None else (node, whole), key=cost)
+
+
+def _holds(condition: Term) -> bool | None:
+    """Whether a comparison of numbers holds; None where it is one of something else: u == u asks whether u has
+    a value."""
+    match condition:
+        case Prim(op="eq" | "lt" | "le" as op, args=(a, b)):
+            value = None if condition.free else constant(sub(a, b))
+            if value is not None:
+                return value == 0 if op == "eq" else value < 0 or (op == "le" and value == 0)
+    return None
+
+
+def _apart(node: If | Branch, tangents: frozenset[str]) -> Term:
+    """With the factors that both sides have in front of the choice."""
+    if ZERO in (node.then, node.orelse):
+        return node
+    one, other = factored(node.then), factored(node.orelse)
+    shared = Factors(Fraction(1), {}, [], [c for c in one.conditions if c in other.conditions])
+    for base, n in one.powers.items():
+        m = other.powers.get(base, Fraction(0))
+        if n * m > 0:
+            shared.times(base, min(n, m, key=abs))
+    shared.exponents = [e for e in one.exponents if e in other.exponents]
+    if not (shared.powers or shared.exponents or shared.conditions):
+        return node
+    if abs(one.coefficient) == abs(other.coefficient):
+        shared.coefficient = max(one.coefficient, other.coefficient)
+    elif one.coefficient < 0 and other.coefficient < 0:
+        shared.coefficient = Fraction(-1)
+    sides = [written(_without(side, shared), tangents) for side in (one, other)]
+    choice = sides[0] if sides[0] == sides[1] else _choosing(node, *sides)
+    shared.times(choice, Fraction(1))
+    return written(shared, tangents)
+
+
+def _without(found: Factors, shared: Factors) -> Factors:
+    rest = Factors(found.coefficient / shared.coefficient, dict(found.powers), [], [])
+    for base, n in shared.powers.items():
+        rest.times(base, -n)
+    rest.exponents = [e for e in found.exponents if e not in shared.exponents]
+    rest.conditions = [c for c in found.conditions if c not in shared.conditions]
+    return rest
+
+
+def _choosing(node: If | Branch, then: Term, orelse: Term) -> Term:
+    """The same choice between two other sides."""
+    sides = {node.then: then, node.orelse: orelse}
+    return rebuild(node, tuple(sides.get(part, part) for part in children(node)))
+
+
+def _of_size(node: Branch, tangents: frozenset[str], inside: frozenset[str]) -> Term | None:
+    """f(abs(u)) for f(u) where u is positive and f(-u) elsewhere, sign(u)*f(abs(u)) for -f(-u) where f(0) is 0."""
+    surface, size = node.surface, prim("abs", node.surface)
+    then = _replaced(node.then, surface, size)
+    orelse = _replaced(node.orelse, neg(surface), size)
+    if then == node.then or orelse == node.orelse:
+        return None
+    if _is_zero(sub(then, orelse)):
+        return then
+    vanishes = factored(then).powers.get(size, Fraction(0)) > 0
+    if vanishes and surface.free.isdisjoint(inside) and _is_zero(add(then, orelse)):
+        return written(factored(mul(prim("sign", surface), then)), tangents)
+    return None
+
+
+def _replaced(term: Term, old: Term, new: Term) -> Term:
+    """With `new` for what is `old`, however it is written."""
+
+    def change(_: Term, now: Term) -> Term:
+        return new if now.free == old.free and (now is old or _is_zero(sub(now, old))) else now
+
+    return transform(term, change)
+
+
+def _is_zero(term: Term) -> bool:
+    found = normal(term)
+    return found is not None and not found.top
