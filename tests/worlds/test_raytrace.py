@@ -226,6 +226,14 @@ def test_a_soft_shadow(at: tuple[float, float]) -> None:
     agrees(found(SHADOWS, "edge", "lx", 0.5, at, q=1.0), exact, 1e-8)
 
 
+def test_the_ramp_of_a_soft_shadow_is_found_straight_through() -> None:
+    """Sections turn next to its end. Nodes set around a turning point that a rounding puts within a stretch, not beyond
+    it, are no good to what is a polynomial: they took nine times as many evaluations."""
+    answer = SHADOWS.eval("deriv(\\t . soft((0.4, 0, 1), (0.6, 1, 1), lamp(t), 0.4, 0.3, 0.2, 0.2))((0.5, 1))")
+    agrees(answer, slope(lambda lx: half_shadow(lx, mp.mpf("0.4"), mp.mpf("0.3"), mp.mpf("0.2")), 0.5), 1e-8)
+    assert answer.evals < 60_000
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("at", [(0.25, 0.4), (0.35, 0.98)], ids=["an edge", "a corner"])
 def test_a_soft_shadow_of_a_triangle(at: tuple[float, float]) -> None:

@@ -313,9 +313,9 @@ def _pieces(
     for root, _ in beyond:
         at = root[owner]
         # a map around a point that is but a rounding beyond an end leaves out the square root of that
-        low, high = (np.where(np.abs(at - end) <= ITSELF * EPS * np.abs(at), end, at) for end in (a, b))
-        left = np.where((low <= a) & (low > left), low, left)
-        right = np.where((high >= b) & (high < right), high, right)
+        near = ITSELF * EPS * np.abs(at)
+        left = np.where((at <= a) & (at > left), np.where(at >= a - near, a, at), left)
+        right = np.where((at >= b) & (at < right), np.where(at <= b + near, b, at), right)
     moving = bool(ta.any() or tb.any())
     bad, ea, eb = np.isnan(x[0]) | np.isnan(x[-1]), e[place, owner], e[place + 1, owner]
     near = np.stack((blur[place, owner], blur[place + 1, owner]))
