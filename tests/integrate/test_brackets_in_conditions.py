@@ -21,6 +21,8 @@ import numpy as np
 import pytest
 
 import potto
+from potto.integrate.plan import make
+from potto.runtime.integration import problem
 
 EPS = 2.0**-52
 Map = tuple[Fraction, Fraction]  # gain and shift
@@ -455,3 +457,38 @@ def test_behind_others_or_decided(condition: str, low: float, length: float, slo
     answer = potto.deriv(f)((0.7, 1.0))
     covered(answer, length, rtol=2 * EPS)  # the lengths themselves are differences of rounded numbers
     covered(answer, slope, tangent=True)
+
+
+# Plans for many parameters
+
+
+@pytest.fixture
+def plans(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
+    """The plans that are made from here on."""
+    made: list[Any] = []
+    monkeypatch.setattr(problem, "make", lambda *args: made.append(make(*args)) or made[-1])
+    return made
+
+
+def test_a_condition_on_an_indicator_has_one_plan(plans: list[Any]) -> None:
+    """As many cases as brackets: none is left out, so that what is planned for the first holds for all of them."""
+    f = potto.compile("def f(t) integral [0, 1] [[x > t and x < 2*t] > 0]*x d(x)").f
+    t = np.array([-1.0, 0.2, 0.3, 0.6, 0.9, 1.5])
+    answer = potto.deriv(f)((t, np.ones(6)))
+    low, high = np.clip(t, 0, 1), np.clip(2 * t, 0, 1)
+    assert np.abs(answer.value - (high**2 - low**2) / 2).max() <= 1e-15  # two roundings of numbers below 1
+    assert answer.tangent == pytest.approx([0, 4 * 0.2 - 0.2, 4 * 0.3 - 0.3, -0.6, -0.9, 0], abs=1e-15)
+    assert len(plans) == 1 and plans[0].premise is None
+
+
+def test_plans_of_several_cases_are_made_once(plans: list[Any]) -> None:
+    """No one plan holds for all of these; what each of them met is known when they come again."""
+    f = potto.deriv(potto.compile(SIMULATION.format(n=3)).f)
+    t = np.array([0.05, 0.3, 0.437, 0.5, 0.713, 0.95])
+    first = f((t, np.ones(6)))
+    known = len(plans)
+    again = f((t, np.ones(6)))
+    assert known > 1 and len(plans) == known
+    assert (again.value == first.value).all() and (again.tangent == first.tangent).all()
+    for at, value in zip(t, first.value, strict=True):
+        assert value == pytest.approx(float(thermostat(3, Fraction(at))), abs=1e-14)

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 
 from msgspec import Struct
 
@@ -61,18 +62,18 @@ def lifted(term: Integral, number: Number) -> Lifted | None:
     """The integral with no bracket inside of a condition; None if that takes too many cases.
 
     number: what a plain term is now, or nan; only sides that are proved to be empty for all parameters around are left
-    out. Calls have been carried out.
+    out. Where there are no more cases than brackets, none is: then it is equal whatever the parameters are. Calls have
+    been carried out.
     """
-    premises: dict[Term, None] = {}
-    try:
-        found = _of_integral(term, Region({}), frozenset(), number, premises)
-    except TooManyCases:
-        return None
-    return Lifted(found, tuple(premises))
+    for known, few in ((closed_value, True), (number, False)):
+        premises: dict[Term, None] = {}
+        with suppress(TooManyCases):
+            return Lifted(_of_integral(term, Region({}), frozenset(), known, few, premises), tuple(premises))
+    return None
 
 
 def _of_integral(
-    term: Integral, outer: Region, names: frozenset[str], number: Number, premises: dict[Term, None]
+    term: Integral, outer: Region, names: frozenset[str], number: Number, few: bool, premises: dict[Term, None]
 ) -> Integral:
     names = names.union(term.variables)
     forms = Forms(names, number)
@@ -80,12 +81,13 @@ def _of_integral(
     memo: dict[Term, Term] = {}
     for node in postorder_by(term.body, lambda node: () if isinstance(node, Integral) else children(node)):
         if isinstance(node, Integral):
-            memo[node] = _of_integral(node, region, names, number, premises)
+            memo[node] = _of_integral(node, region, names, number, few, premises)
         else:
             memo[node] = rebuild(node, tuple(memo[c] for c in children(node)))
     body = memo[term.body]
     if any(nested(c) for node in outside(body, (Integral,)) for c in coordinates_of(node)):
-        trees = _Trees(body, forms, region)
+        brackets = sum(isinstance(node, Branch) for node in outside(body, (Integral,)))
+        trees = _Trees(body, forms, region, brackets if few else MOST_CASES)
         body = trees.apart(body)
         premises |= dict.fromkeys((*ordered, *trees.premises))
     return with_integrand(term, body)
@@ -114,9 +116,10 @@ Build = Callable[[tuple[Term, ...], Region], "Tree"]
 class _Trees:
     """The terms of one integrand as trees of the decisions that matter inside of conditions."""
 
-    def __init__(self, body: Term, forms: Forms, region: Region) -> None:
+    def __init__(self, body: Term, forms: Forms, region: Region, most: int) -> None:
         self.forms = forms
         self.region = region
+        self.most = most
         self.premises: dict[Term, None] = {}
         self.cases = 0  # of the tree that is being made
         self.splits: dict[tuple[object, ...], Split] = {}
@@ -262,7 +265,7 @@ class _Trees:
         known = (coordinates, strict, then, orelse)
         if known not in self.splits:
             self.cases += 1
-            if self.cases > MOST_CASES:
+            if self.cases > self.most:
                 raise TooManyCases
             self.splits[known] = Split(coordinates, strict, key, up, then, orelse)
         return self.splits[known]

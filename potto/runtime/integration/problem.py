@@ -214,10 +214,16 @@ class Problem:
         return {}
 
     def _plan(self) -> Plan:
-        known = self.known.plans
+        known, partly = self.known.plans, None
         for plan in tuple(known):
-            if all(self.decided(t) == value for t, value in plan.decisions) and self.fits(plan):
-                return plan
+            if all(self.decided(t) == value for t, value in plan.decisions):
+                fits = self.fitting(plan)
+                if fits.all():
+                    return plan
+                if partly is None and fits.flat[0]:
+                    partly = fits
+        if partly is not None:  # another one for the first member would be the same
+            raise Mixed(partly)
         with making:
             outlines = self.machine.linker.outlines
             plan = make(self.term, self.function, self.decided, self.plain_function, _Sampled(self), outlines)
@@ -277,10 +283,6 @@ class Problem:
         if isinstance(head, Var) and type(self.env.get(head.name)) is not Closure:
             return None
         return self.function(head)
-
-    def fits(self, plan: Plan) -> bool:
-        """Whether a plan holds for all members."""
-        return plan.premise is None or bool(self.fitting(plan).all())
 
     def fitting(self, plan: Plan) -> Bools:
         """The members for which a plan holds."""
