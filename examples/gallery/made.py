@@ -8,6 +8,7 @@ import json
 import re
 import runpy
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -113,10 +114,15 @@ def _picture(entry: Picture, chapter: Chapter, out: Path, stem: str, quick: bool
     answer = json.loads(said.getvalue())
     if not answer["converged"]:
         raise RuntimeError(_trouble(answer["holes"], trouble.getvalue()))
-    files = tuple(Shown(Path(file["file"]).name, file["shows"]) for file in answer["files"])
+    files = tuple(Shown(Path(file["file"]).name, _told(file)) for file in answer["files"])
     source, error = f"{chapter.name}/{entry.program}.po", float(answer["largest_error"])
     detail = f"{width} x {height}, {answer['evals']:,} evaluations"
     return Made(entry.title, entry.about, source, files, answer["seconds"], error, answer["evals"], detail)
+
+
+def _told(file: Mapping[str, Any]) -> str:
+    """What a picture shows, with the numbers at the ends of its colours."""
+    return f"{file['shows']}, {file['low']:.3g} to {file['high']:.3g}"
 
 
 def _trouble(holes: int, said: str) -> str:

@@ -56,7 +56,8 @@ def index(chapters: Chapters, folder: Path, seconds: float) -> str:
         '<!doctype html><html lang="en"><meta charset="utf-8"><title>Potto: the gallery</title>',
         f'<meta name="viewport" content="width=device-width"><style>{STYLE}</style><h1>Gallery</h1>',
         f"<p>{count} pictures of the programs in <code>examples/</code>, made in {seconds:.0f} s by "
-        '<code>make gallery</code>; <a href="contact.svg">all of them on one sheet</a>.</p>',
+        '<code>make gallery</code>; <a href="contact.svg">all of them on one sheet</a>. Values go from black to white, '
+        "and derivatives from blue through white, which is 0, to red; captions name the numbers at both ends.</p>",
     ]
     for title, about, entries in chapters:
         parts.append(f"<h2>{html.escape(title)}</h2><p>{html.escape(about)}</p>")
@@ -76,7 +77,7 @@ def contact_sheet(chapters: Chapters, folder: Path) -> str:
     for title, _, entries in chapters:
         y += HEADING
         parts.append(f'<text class="heading" x="{GAP}" y="{y - 12}">{html.escape(title)}</text>')
-        shown = [(entry.title, picture) for entry in entries for picture in entry.files]
+        shown = [(entry.title, _on_sheet(entry, picture)) for entry in entries for picture in entry.files]
         curves = [cell for cell in shown if cell[1].file.endswith(".svg")]
         for cells, across, shape in (([c for c in shown if c not in curves], 6, 1.0), (curves, 4, 2 / 3)):
             width = (SHEET - GAP) / across - GAP
@@ -94,6 +95,11 @@ def contact_sheet(chapters: Chapters, folder: Path) -> str:
         *parts,
         "</svg>\n",
     ])  # fmt: skip
+
+
+def _on_sheet(entry: Made, shown: Shown) -> Shown:
+    """A picture as the sheet tells of it: of a curve, whose axis says what it is over, what its entry is about."""
+    return Shown(shown.file, entry.about) if entry.about and shown.file.endswith(".svg") else shown
 
 
 def _cell(name: str, shown: Shown, folder: Path, box: tuple[float, float, float, float]) -> str:

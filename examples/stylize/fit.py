@@ -3,7 +3,8 @@
 
 The loss and its gradient, in all corners and colours, are those of `stylize.po`; scipy's L-BFGS-B goes down. Triangles
 are kept from turning over by a barrier: the loss grows without end as one loses its area. Corners are measured in cells
-of the grid, so that a step moves them about as far as it changes colours, and the first ones turn nothing over.
+of the grid, so that a step moves them about as far as it changes colours, and the first ones turn nothing over. Colours
+are measured by polynomials that are orthogonal over a triangle of the grid: 1, x and y are next to the same there.
 """
 
 from __future__ import annotations
@@ -83,10 +84,12 @@ def fitted(kind: str, photo: np.ndarray, side: int, steps: int, slopes: Slopes |
     cell = (1 + 2 * BEYOND) / side
     first, count = mesh.areas(), 2 * int(free.sum())
 
+    measured = orthogonal(mesh)
+
     def unpacked(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         corners = mesh.corners.copy()
         corners[free] = cell * x[:count].reshape(-1, 2)
-        return corners, x[count:].reshape(mesh.colours.shape)
+        return corners, measured @ x[count:].reshape(mesh.colours.shape)
 
     def down(x: np.ndarray) -> tuple[float, np.ndarray]:
         corners, colours = unpacked(x)
@@ -95,18 +98,35 @@ def fitted(kind: str, photo: np.ndarray, side: int, steps: int, slopes: Slopes |
             return 1e3, np.zeros_like(x)
         loss, by_corner, by_colour = slopes(corners, mesh.faces, colours, photo)
         by_corner = cell * (by_corner + _barrier_slopes(mesh.faces, corners, left))
+        by_colour = measured.transpose(0, 2, 1) @ by_colour
         reached.append(loss)
         return loss - BARRIER * np.log(left / first).sum(), np.concatenate([by_corner[free].ravel(), by_colour.ravel()])
 
     reached: list[float] = []
     start = time.perf_counter()
-    begin = np.concatenate([mesh.corners[free].ravel() / cell, mesh.colours.ravel()])
+    colours = np.linalg.solve(measured, mesh.colours)
+    begin = np.concatenate([mesh.corners[free].ravel() / cell, colours.ravel()])
     found = minimize(down, begin, jac=True, method="L-BFGS-B", options={"maxiter": steps},
                      callback=lambda x: mesh.losses.append(reached[-1]))  # fmt: skip
     mesh.corners, mesh.colours = unpacked(found.x)
     mesh.losses.insert(0, reached[0])
     mesh.seconds = time.perf_counter() - start
     return mesh
+
+
+def monomials(x: np.ndarray, y: np.ndarray, count: int) -> np.ndarray:
+    """What the coefficients of a colour are of, as the shaders have them: (count, …)."""
+    return np.stack([np.ones_like(x), x, y, x * x, x * y, y * y])[:count]
+
+
+def orthogonal(mesh: Mesh) -> np.ndarray:
+    """By triangle the coefficients of polynomials whose products with one another have the mean 0 over it, and with
+    themselves 1: (n, terms, terms), one in a column. The mean is that of places spread evenly over the triangle."""
+    u, v = np.array([(i + 1 / 3, j + 1 / 3) for i in range(6) for j in range(6 - i)]).T / 6
+    a, b, c = np.moveaxis(mesh.corners[mesh.faces], 1, 0)[..., None]
+    x, y = np.moveaxis(a + (b - a) * u + (c - a) * v, 1, 0)
+    terms = np.moveaxis(monomials(x, y, mesh.colours.shape[1]), 0, 1)
+    return np.linalg.inv(np.linalg.cholesky(terms @ terms.transpose(0, 2, 1) / u.size)).transpose(0, 2, 1)
 
 
 def _barrier_slopes(faces: np.ndarray, corners: np.ndarray, left: np.ndarray) -> np.ndarray:
@@ -123,7 +143,7 @@ def drawn(mesh: Mesh, side: int) -> np.ndarray:
     """The mesh as a picture, (side, side, 3) bytes: the colour at the middle of each pixel."""
     line = (np.arange(side) + 0.5) / side
     x, y = np.meshgrid(line, line)
-    terms = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y])[: mesh.colours.shape[1]]
+    terms = monomials(x, y, mesh.colours.shape[1])
     picture = np.zeros((side, side, 3))
     for face, colours in zip(mesh.faces, mesh.colours, strict=True):
         a, b, c = mesh.corners[face]
