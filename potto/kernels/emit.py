@@ -3,7 +3,7 @@
 Owns `Scalar` (the variables that hold the parts of a cell) and `Lines`. Per builtin the value, and where they exist
 the error bound and the tangents, are emitted together, from the partial derivatives of the registry:
 v = f(a), t_d = sum_i p_i(a) t_i,d, e = sum_i |p_i| e_i and et_d = sum_i |p_i| et_i,d + sum_ij |t_i,d p_ij| e_j, first
-order in the errors.
+order in the errors, and where rounding is kept track of what the p_i are off themselves, which `slopes` knows.
 """
 
 from __future__ import annotations
@@ -17,7 +17,8 @@ from msgspec import Struct
 
 from potto.calculus.differentiation.derivative import partial
 from potto.core.terms import Branch, Const, If, Prim, Term, Var, postorder, var
-from potto.kernels.whole import ROUNDING, TWICE, UNIT_ROUNDOFF
+from potto.kernels.slopes import EXACT, Loss, losses
+from potto.kernels.whole import ROUNDING, UNIT_ROUNDOFF
 from potto.primitives import PRIMITIVES
 from potto.primitives.walking import formula_of
 
@@ -50,6 +51,7 @@ class Scalar(Struct, frozen=True):
 
 
 Bend = Callable[[int, int], str | None]  # how the slope by one argument changes with another
+Losses = Mapping[int, Loss]  # what slopes are off
 Tangents = tuple[tuple[str | None, ...], tuple[str | None, ...]]  # and their errors
 
 
@@ -210,8 +212,14 @@ class Lines:
 
     def added(self, args: Sequence[Scalar]) -> Tangents:
         """The tangents of a sum."""
-        t = tuple(self.total([x for a in args if (x := a.t[d])]) for d in range(self.directions))
-        return t, tuple(self.total([x for a in args if (x := a.et[d])]) for d in range(self.directions))
+        t, et = [], []
+        for d in range(self.directions):
+            t.append(self.total([x for a in args if (x := a.t[d])]))
+            bounds = [x for a in args if (x := a.et[d])]
+            if self.rounding and len(factors := exact_slopes("add", args, d) or ()) > 1:
+                bounds.append(self.kept(t[-1] or ZERO, factors))
+            et.append(self.total(bounds))
+        return tuple(t), tuple(et)
 
     def negated(self, x: Scalar) -> Tangents:
         """The tangents of a number with the other sign."""
@@ -236,6 +244,7 @@ class Lines:
         memo: dict[Term, Scalar] = {}
         moving = [i for i, a in enumerate(args) if not a.plain]
         slope = {i: self.smooth(first[i], local, memo).v for i in moving}
+        lost = {i: self.loss(first[i], memo) for i in moving} if self.tracked(op, args) else {}
 
         def bend(i: int, j: int) -> str | None:
             curve = self.smooth(second_partial(op, len(args), i, j), local, memo).v
@@ -243,10 +252,10 @@ class Lines:
 
         e = self.total([f"abs({self.product(slope[i], x)})" for i in moving if (x := args[i].e)])
         if self.side and self.directions and PRIMITIVES[op].kinks(*map(var, names)):
-            return self.rounded(Scalar(v, e, *self.on_one_side(op, args, bend)), op, args)
-        return self.rounded(Scalar(v, e, *self.tangents(op, args, slope, bend)), op, args)
+            return self.rounded(Scalar(v, e, *self.on_one_side(op, args, bend, lost)), op, args)
+        return self.rounded(Scalar(v, e, *self.tangents(op, args, slope, bend, lost)), op, args)
 
-    def on_one_side(self, op: str, args: Sequence[Scalar], bend: Bend) -> Tangents:
+    def on_one_side(self, op: str, args: Sequence[Scalar], bend: Bend, lost: Losses) -> Tangents:
         """The tangents of a builtin with kinks: where it is at one its slopes are not the same in every direction."""
         names, first = partials(op, len(args))
         found = []
@@ -257,52 +266,80 @@ class Lines:
             self.side, side = 0, self.side
             slopes = {i: self.smooth(first[i], local, memo, (d, side)).v for i, a in enumerate(args) if not a.plain}
             self.side = side
-            t, et = self.tangents(op, args, slopes, bend)
+            t, et = self.tangents(op, args, slopes, bend, lost)
             found.append((t[d], et[d]))
         return tuple(t for t, _ in found), tuple(et for _, et in found)
 
-    def tangents(self, op: str, args: Sequence[Scalar], slopes: Mapping[int, str], bend: Bend) -> Tangents:
+    def tracked(self, op: str, args: Sequence[Scalar]) -> bool:
+        """Whether it matters what a builtin's slopes are off."""
+        moving = any(x for a in args for x in a.t)
+        return self.rounding and moving and all(exact_slopes(op, args, d) is None for d in range(self.directions))
+
+    def loss(self, slope: Term, memo: dict[Term, Scalar]) -> Loss:
+        """What a slope is off. memo: its parts."""
+
+        def steep(node: Prim) -> list[str]:
+            names, first = partials(node.op, len(node.args))
+            local = {n: memo[arg] for n, arg in zip(names, node.args, strict=True)}
+            own: dict[Term, Scalar] = {}
+            return [self.smooth(term, local, own).v for term in first]
+
+        return losses(slope, {term: scalar.v for term, scalar in memo.items()}, steep, self)
+
+    def tangents(
+        self, op: str, args: Sequence[Scalar], slopes: Mapping[int, str], bend: Bend, lost: Losses
+    ) -> Tangents:
         """The tangents of a builtin with these slopes by those of its arguments that move or are not exact."""
         t, et = [], []
         for d in range(self.directions):
-            t.append(self.total([self.product(slope, x) for i, slope in slopes.items() if (x := args[i].t[d])]))
+            moving = {i: x for i in slopes if (x := args[i].t[d])}
+            parts = {i: self.product(slopes[i], x) for i, x in moving.items()}
+            if self.rounding and len(parts) > 1:
+                parts = {i: self.let(part, "t") for i, part in parts.items()}
+            t.append(self.total(list(parts.values())))
             bounds = [f"abs({self.product(slope, x)})" for i, slope in slopes.items() if (x := args[i].et[d])]
-            for i in slopes:
+            for i, x in moving.items():
                 for j in slopes:
-                    if (x := args[i].t[d]) and (e := args[j].e) and (curve := bend(i, j)):
+                    if (e := args[j].e) and (curve := bend(i, j)):
                         bounds.append(f"abs({self.product(curve, x, e)})")
+            if self.rounding and parts:
+                bounds += self.tangent_rounded(t[-1] or ZERO, exact_slopes(op, args, d), parts, lost)
+                bounds += [
+                    f"abs({self.product(off, x)})" for i, x in moving.items() if (off := lost.get(i, EXACT).rest)
+                ]
             et.append(self.total(bounds))
         return tuple(t), tuple(et)
+
+    def tangent_rounded(
+        self, t: str, exact: list[tuple[str, str]] | None, parts: Mapping[int, str], lost: Losses
+    ) -> list[str]:
+        """What a tangent rounds off that is a sum of slopes times tangents."""
+        if exact is not None:
+            return [] if len(exact) == 1 and ONE in exact[0] else [self.kept(t, exact)]
+        steps = 1 if len(parts) == 1 else 2  # a product, and the sum that it goes into
+        return [f"{max(lost.get(i, EXACT).part + steps, 2) * UNIT_ROUNDOFF!r}*abs({x})" for i, x in parts.items()]
+
+    def kept(self, t: str, exact: Sequence[tuple[str, str]]) -> str:
+        """What a tangent rounds off whose slopes are numbers as they are."""
+        return f"{self.ufunc('whole.slopes')}({', '.join((t, *chain.from_iterable(exact)))})"
 
     def rounded(self, x: Scalar, op: str, args: Sequence[Scalar]) -> Scalar:
         """With the rounding of this operation added to the bounds, where the kernel keeps track of it."""
         if not self.rounding:
             return x
-        e = x.e
-        entry = PRIMITIVES[op]
+        e, entry = x.e, PRIMITIVES[op]
         if entry.ulp:
             unit = f"{(1.0 if callable(entry.ulp) else entry.ulp) * UNIT_ROUNDOFF!r}*abs({x.v})"
             if op in ROUNDING:
                 unit = f"{self.ufunc('whole.' + op)}({', '.join((x.v, *(a.v for a in args)))})"
             elif callable(entry.ulp):
                 unit = f"{self.ufunc('places.' + op)}({', '.join(a.v for a in args)})*{unit}"
-            if entry.off:
+            if callable(entry.off):
+                unit += f" + {self.ufunc('strays.' + op)}({', '.join(a.v for a in args)})"
+            elif entry.off:
                 unit += f" + {entry.off!r}"
             e = self.let(f"{e + ' + ' if e else ''}{unit}", "e")
-        et: list[str | None] = []
-        for d, (t, old) in enumerate(zip(x.t, x.et, strict=True)):
-            lost = self.tangent_rounded(t, op, args, d) if t else None
-            et.append(self.let(f"{old} + {lost}" if old else lost, "e") if lost else old)
-        return Scalar(x.v, e, x.t, tuple(et))
-
-    def tangent_rounded(self, t: str, op: str, args: Sequence[Scalar], d: int) -> str | None:
-        """What a tangent rounds off; None where it is another one as it was."""
-        factors = exact_slopes(op, args, d)
-        if factors is None:
-            return f"{TWICE!r}*abs({t})"
-        if op != "pow" and len(factors) == 1 and ONE in factors[0]:
-            return None
-        return f"{self.ufunc('whole.slopes')}({', '.join((t, *chain.from_iterable(factors)))})"
+        return Scalar(x.v, e, x.t, x.et)
 
     def smooth(
         self, term: Term, local: dict[str, Scalar], memo: dict[Term, Scalar],

@@ -2,7 +2,8 @@
 
 Owns `function`, which finds them: "sqrt" is numpy's, "special.erf" scipy's (imported at the first use), "potto.clamp"
 one of `potto.kernels.ufuncs`, "whole.add" one of `potto.kernels.whole`, "tape.linear" of `potto.kernels.tape`,
-"support.select" one of those below, "builtin.gamma" the numeric form of a builtin and "places.erfc" what it may be off.
+"support.select" one of those below, "builtin.gamma" the numeric form of a builtin, "places.erfc" and "strays.besselj0"
+what these may be off.
 `OPS` is the arithmetic of arrays for the rules of entries.
 """
 
@@ -40,6 +41,8 @@ def function(path: str) -> Callable[..., Any]:
         return getattr(tape, name)  # type: ignore[no-any-return]
     if where == "places":
         return PRIMITIVES[name].places
+    if where == "strays":
+        return PRIMITIVES[name].strays
     if where == "support":
         return globals()[name]  # type: ignore[no-any-return]
     return getattr(np, name)  # type: ignore[no-any-return]

@@ -7,7 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from potto.kernels.emit import ONE, Bend, Lines, Scalar, Tangents, exact_slopes
+from potto.kernels.emit import ONE, Bend, Lines, Losses, Scalar, Tangents, exact_slopes
+from potto.kernels.slopes import EXACT
+from potto.kernels.whole import UNIT_ROUNDOFF
 
 
 class TapeLines(Lines):
@@ -16,12 +18,18 @@ class TapeLines(Lines):
     def __init__(self, rounding: bool) -> None:
         super().__init__(1, rounding)
 
-    def tangents(self, op: str, args: Sequence[Scalar], slopes: Mapping[int, str], bend: Bend) -> Tangents:
+    def tangents(
+        self, op: str, args: Sequence[Scalar], slopes: Mapping[int, str], bend: Bend, lost: Losses
+    ) -> Tangents:
         edges = []
         for i, slope in slopes.items():
             if args[i].t[0]:
                 bends = [(found, e) for j in slopes if (e := args[j].e) and (found := bend(i, j))]
-                off = self.total([f"abs({self.product(found, e)})" for found, e in bends])
+                own = lost.get(i, EXACT)
+                more = [own.rest] if own.rest else []
+                if own.part > 1:  # one rounding of a slope is that of every edge which is not kept
+                    more.append(f"{(own.part - 1) * UNIT_ROUNDOFF!r}*abs({slope})")
+                off = self.total([f"abs({self.product(found, e)})" for found, e in bends] + more)
                 edges.append((slope, args[i].t[0], off))
         return self.linear(edges, exact_slopes(op, args, 0) is not None)
 
@@ -36,7 +44,3 @@ class TapeLines(Lines):
             return self.none, self.none
         text = ", ".join(f"({slope}, {tangent}, {off})" for slope, tangent, off in edges)
         return (self.let(f"{self.ufunc('tape.multiples' if kept else 'tape.linear')}({text})", "t"),), self.none
-
-    def rounded(self, x: Scalar, op: str, args: Sequence[Scalar]) -> Scalar:
-        found = super().rounded(Scalar(x.v, x.e, self.none, self.none), op, args)
-        return Scalar(found.v, found.e, x.t, self.none)

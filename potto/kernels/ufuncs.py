@@ -42,3 +42,12 @@ def _bessel(order: int, x: Any, out: Any) -> Any:
         return accurate
     out[...] = accurate
     return out
+
+
+def sphericalj(n: Any, x: Any, out: Any = None) -> Any:
+    """The spherical Bessel function of a whole order."""
+    found = import_module("scipy.special").spherical_jn(np.asarray(n, dtype=int), x)
+    if out is None:
+        return found
+    out[...] = found
+    return out

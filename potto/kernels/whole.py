@@ -123,21 +123,18 @@ def power(value: Any, base: Any, exponent: Any) -> Any:
 
 def slopes(tangent: Any, *factors: Any) -> Any:
     """What a tangent rounds off that is a sum of slopes times tangents, given one after the other, where the slopes are
-    exact: nothing as long as all are whole, so that the slope of 2*x is 2, and not 2 give or take something."""
-    if isinstance(tangent, np.ndarray):
-        if tangent.size > _looking.most:
-            return TWICE * abs(tangent)
-        return np.where(_all_whole(*factors) & (_largest(tangent, factors) <= LARGEST), 0.0, TWICE * abs(tangent))
-    exact = _whole(*factors) and _largest(tangent, factors) <= LARGEST
-    return 0.0 if exact else TWICE * abs(tangent)
+    exact: nothing as long as all are whole, so that the slope of 2*x is 2, and not 2 give or take something. Summands
+    may cancel."""
+    pairs = list(zip(factors[::2], factors[1::2], strict=True))
+    products = [a * b for a, b in pairs]
+    if isinstance(tangent, np.ndarray) and tangent.size > _looking.most:
+        return max(len(pairs), 2) * UNIT_ROUNDOFF * sum(map(abs, products))
+    off = sum(0.0 if _is_one(a) or _is_one(b) else mul(p, a, b) for p, (a, b) in zip(products, pairs, strict=True))
+    return off if len(pairs) == 1 else off + add(tangent, *products)
 
 
-def _largest(tangent: Any, factors: tuple[Any, ...]) -> Any:
-    """A bound of all that is met on the way to the tangent."""
-    size = abs(tangent)
-    for i in range(0, len(factors) if len(factors) > 2 else 0, 2):
-        size = size + abs(factors[i] * factors[i + 1])
-    return size
+def _is_one(x: Any) -> bool:
+    return x.__class__ is float and abs(x) == 1
 
 
 ROUNDING: dict[str, Callable[..., Any]] = {

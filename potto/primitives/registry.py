@@ -61,7 +61,8 @@ class Primitive(Struct, frozen=True):
     scalar: the same for numbers one by one, "math.xyz" as a rule; where there is none mpmath is asked.
     ulp: what its numeric form may be off, in units of half a last place, as a number or by the arguments; 0 if its
         values are those of an argument, perhaps with the other sign.
-    off: what it may be off beside that, absolutely: of functions that keep no digits where they cross 0.
+    off: what it may be off beside that, absolutely, as a number or by the arguments: of functions that keep no digits
+        where they cross 0.
     guarded: whether the numeric form has values also outside of `within`, which are not the builtin's.
 
     Derivatives:
@@ -113,7 +114,7 @@ class Primitive(Struct, frozen=True):
     mpmath: str = ""
     scalar: str = ""
     ulp: float | Callable[..., Any] = 1.0
-    off: float = 0.0
+    off: float | Callable[..., Any] = 0.0
     guarded: bool = False
 
     partials: Callable[..., Terms] | None = None
@@ -141,6 +142,10 @@ class Primitive(Struct, frozen=True):
     def places(self, *args: Any) -> Any:
         """What the numeric form may be off at some arguments, in units of half a last place."""
         return self.ulp(*args) if callable(self.ulp) else self.ulp
+
+    def strays(self, *args: Any) -> Any:
+        """What it may be off beside that, absolutely."""
+        return self.off(*args) if callable(self.off) else self.off
 
     @property
     def piecewise_monotone(self) -> bool:

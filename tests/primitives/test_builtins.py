@@ -43,7 +43,7 @@ def numbers(lo: float, hi: float) -> st.SearchStrategy[float]:
 
 def points(primitive: Primitive) -> st.SearchStrategy[tuple[float, ...]]:
     return st.tuples(*(numbers(lo, hi) for lo, hi in domains(primitive))).map(
-        lambda point: (*(round(2 * x) / 2 for x in point[: primitive.orders]), *point[primitive.orders :])
+        lambda point: (*(float(round(x)) for x in point[: primitive.orders]), *point[primitive.orders :])
     )
 
 
@@ -96,7 +96,8 @@ def test_values_agree_with_mpmath(primitive: Primitive, data: st.DataObject) -> 
 @settings(deadline=None, max_examples=12)
 @given(data=st.data())
 def test_partials_agree_with_mpmath(primitive: Primitive, data: st.DataObject) -> None:
-    """The formulas at 40 digits against differences at 110: 1e-25 relative is all that differences keep."""
+    """The formulas at 40 digits against differences at 110: 1e-25 relative is all that differences keep, and where a
+    derivative is 0 they keep the square of their step of 1e-30."""
     point = data.draw(points(primitive))
     assume(regular(primitive, point))
     env = dict(zip(names(primitive), point))
@@ -105,7 +106,8 @@ def test_partials_agree_with_mpmath(primitive: Primitive, data: st.DataObject) -
         with mp.workdps(110):
             wanted = slope(primitive, point, i)
         found = evaluate(formula, env, digits=40)
-        assert abs(found - wanted) <= mp.mpf("1e-25") * (abs(wanted) + abs(exact(primitive, *point)) * EPS)
+        allowed = mp.mpf("1e-25") * (abs(wanted) + abs(exact(primitive, *point)) * EPS) + mp.mpf("1e-60")
+        assert abs(found - wanted) <= allowed
 
 
 def slope(primitive: Primitive, point: tuple[float, ...], i: int) -> mp.mpf:

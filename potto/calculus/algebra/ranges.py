@@ -151,7 +151,8 @@ def _bounded(entry: Primitive, args: tuple[Range, ...]) -> Range:
             return ANYTHING
     places = max(1.0, *(entry.places(*ends) for ends in zip(*bounds, strict=True)))
     room = 2e-15 * places if places < math.inf else 0.0  # eight of the last places of a good one
-    low, high = ((e + s * (room * abs(e) + entry.off) if math.isfinite(e) else e) for e, s in ((lo, -1), (hi, 1)))
+    off = max(0.0, *(entry.strays(*ends) for ends in zip(*bounds, strict=True)))  # nan at infinity
+    low, high = ((e + s * (room * abs(e) + off) if math.isfinite(e) else e) for e, s in ((lo, -1), (hi, 1)))
     found = _range(low, high, _may_vanish(entry, args))
     return Range(max(found.lo, entry.image[0]), min(found.hi, entry.image[1]), found.zero)
 

@@ -63,6 +63,12 @@ def maximum(*args: Number) -> Number:
     return mp.nan if any(mp.isnan(a) for a in args) else max(args)
 
 
+def sphericalj(n: Number, x: Number) -> Number:
+    """By its series, which is the same on both sides of 0."""
+    a = n + mp.mpf(1.5)
+    return mp.sqrt(mp.pi) / 2 / mp.gamma(a) * (x / 2) ** int(n) * mp.hyp0f1(a, -x * x / 4)
+
+
 def clamp(x: Number, lo: Number, hi: Number) -> Number:
     return minimum(maximum(x, lo), hi)
 

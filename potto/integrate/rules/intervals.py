@@ -129,19 +129,22 @@ def _by_entry(entry: Primitive, bounds: Callable[..., tuple[Any, ...]], args: tu
     if entry.ulp != 1:
         lower, upper = (entry.places(*ends) for ends in zip(*args, strict=True))
         room = np.minimum(ROUNDING + EPS * np.maximum(lower, upper), 1.0)
-    lo, hi = _defined(args, result, room, entry.off)
+    off: Any = entry.off
+    if callable(off):
+        off = np.fmax(np.fmax(*(off(*ends) for ends in zip(*args, strict=True))), 0.0)  # nan at infinity
+    lo, hi = _defined(args, result, room, off)
     least, most = entry.image
     return (lo if least == -np.inf else np.maximum(lo, least)), (hi if most == np.inf else np.minimum(hi, most))
 
 
-def _defined(args: Sequence[Interval], result: tuple[Any, ...], room: Any = ROUNDING, off: float = 0.0) -> Interval:
+def _defined(args: Sequence[Interval], result: tuple[Any, ...], room: Any = ROUNDING, off: Any = 0.0) -> Interval:
     """Rounded outwards; nan (inf - inf) becomes no bound, but where an argument has no value, neither has the result.
 
     Neither has what is infinite all over. A third item of the result says where the builtin itself is not defined.
     """
     lo, hi = result[0], result[1]
     below, above = lo - room * abs(lo), hi + room * abs(hi)
-    if off:
+    if off.__class__ is not float or off:
         below, above = below - off, above + off
     unsure = [a[0] for a in args if a.__class__ is not _Finite]
     found = _marked(below, above)

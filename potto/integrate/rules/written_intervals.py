@@ -54,10 +54,10 @@ class Written(Domain[Names]):
 
     def rule(self, entry: Primitive) -> Rule[Names] | None:
         """The rule of the entry, whose arithmetic is written down as it is done."""
-        found, ulp = interval_of(entry), entry.ulp
+        found, ulp, off = interval_of(entry), entry.ulp, entry.off
         if found is None:
             return None
-        if callable(ulp):
+        if callable(ulp) or callable(off):
             raise NotStraight(entry.name)
 
         def run(*args: Names) -> Names:
@@ -65,8 +65,8 @@ class Written(Domain[Names]):
             nowhere = _mask_name(result[2]) if len(result) == 3 and entry.within != ANYTHING else None
             ends = Names(_name(self.at, result[0]), _name(self.at, result[1]), nowhere)
             low, high, *_ = self.outwards(ends, ROUNDING if ulp == 1 else ROUNDING + EPS * ulp)
-            if entry.off:
-                low, high = (self.op(code, end, self.number(entry.off)) for code, end in (("sub", low), ("add", high)))
+            if off:
+                low, high = (self.op(code, end, self.number(off)) for code, end in (("sub", low), ("add", high)))
             least, most = entry.image
             return Names(
                 low if least == -np.inf else self.op("max", low, self.number(least)),
