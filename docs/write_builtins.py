@@ -36,9 +36,9 @@ INTRODUCTION = """# Builtins
 Written by `docs/write_builtins.py` from the tables in `potto/primitives` and `potto/measures`.
 
 The arithmetic `+ - * / ^` is written as usual; `^` binds tightest and to the right. `pi` and `inf` are constants.
-Every builtin takes numbers. Derivatives are by each argument in turn. They may name two functions that programs cannot:
-`hurwitz(s, x)` is the sum of `(x + n)^(-s)` over all n from 0, and `hyp0f1(a, z)` the confluent hypergeometric limit
-function.
+Every builtin takes numbers. Derivatives are by each argument in turn. They may name functions that programs cannot:
+`hurwitz(s, x)` is the sum of `(x + n)^(-s)` over all n from 0, `besselj(n, x)` the Bessel function of the first kind of
+order n and `sphericalj(n, x)` the spherical one.
 """
 
 
