@@ -22,8 +22,9 @@ figure img{height:15rem;max-width:100%;border-radius:6px;border:1px solid var(--
 .drawn img{image-rendering:pixelated}
 code{font-size:.85em}.measured{font-size:.85rem}
 """
-# Of the sheet: its width, what is between cells, above a chapter and below a picture, and how wide a letter is
-SHEET, GAP, HEADING, LABEL, LETTER = 1072, 12, 40, 76, 5.6
+# Of the sheet: its width, what is between cells, above a chapter and below a picture for how many lines, and how wide a
+# letter is
+SHEET, GAP, HEADING, LABEL, LINES, LETTER = 1072, 12, 40, 76, 4, 6.2
 DRAWN, ENLARGED = ' class="drawn"', 240  # the index shows pictures 15 rem high
 
 
@@ -112,7 +113,8 @@ def _cell(name: str, shown: Shown, folder: Path, box: tuple[float, float, float,
     parts = [f'<image{_kind(folder / shown.file)} {place} href="data:{kind};base64,{data}"/>']
     parts.append(f'<rect class="frame" {place}/>')
     letters = int(width / LETTER)
-    names, lines = (textwrap.wrap(text, letters, max_lines=2, placeholder="…") for text in (name, shown.caption))
+    names = textwrap.wrap(name, letters, max_lines=2, placeholder="…")
+    lines = textwrap.wrap(shown.caption, letters, max_lines=LINES - len(names), placeholder="…")
     for line, text in enumerate([*names, *lines]):
         style = ' class="name"' if line < len(names) else ""
         parts.append(f'<text{style} x="{x:.1f}" y="{y + height + 15 + 14 * line:.1f}">{html.escape(text)}</text>')
