@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from fractions import Fraction
+from functools import lru_cache
 
 from msgspec import Struct
 
@@ -123,14 +124,19 @@ def _product(items: Iterable[Parts]) -> Parts | None:
         if len(result) * len(item) > 4 * _LARGEST:
             return None
         grown: Parts = {}
+        factors = [(n, add(*ds)) for n, ds in item.items()]
         for m, cs in result.items():
-            for n, ds in item.items():
-                grown.setdefault(_join(m, n), []).append(mul(add(*cs), add(*ds)))
+            left = add(*cs)
+            for n, right in factors:
+                grown.setdefault(_join(m, n), []).append(mul(left, right))
         result = grown
     return result
 
 
+@lru_cache(maxsize=16384)
 def _join(first: Monomial, second: Monomial) -> Monomial:
+    if not first or not second:
+        return first or second
     degrees = dict(first)
     for atom, degree in second:
         degrees[atom] = degrees.get(atom, Fraction(0)) + degree
