@@ -104,6 +104,21 @@ def test_a_sign_that_conditions_tell_is_not_written() -> None:
     assert explain_derivative(library.db, file, "f").tangent == "da*[a > 0 and a < 0.5]"
 
 
+@pytest.mark.parametrize(
+    ("program", "read"),
+    [
+        ("def f(t) integral ([0, 1], [0, x]) [x < t] d(x, y)", "t*dt*[t > 0 and t < 1]"),
+        ("def f(t) integral ([0, 1], [x, 1]) [x^2 + y^2 < t]*y d(x, y)",
+         "integral [0, 1] dt/2*[2*x^2 < t and t < x^2 + 1] d(x)"),
+    ],
+)  # fmt: skip
+def test_what_an_integral_does_not_depend_on_is_not_integrated(program: str, read: str) -> None:
+    """A constant is one times the length, 0 is nothing; and x < sqrt(t - x^2) is 2*x^2 < t where x is positive."""
+    library = Library()
+    file = library.put("<text>", program + "\n")
+    assert explain_derivative(library.db, file, "f").tangent == read
+
+
 def test_what_both_sides_of_a_choice_share_stands_before_it() -> None:
     library = Library()
     file = library.put("<text>", "def f(t, s) integral [0, 1] (if [x < 1/2] then x*exp(-t*x) else 3*exp(-t*x)) d(x)\n")

@@ -34,6 +34,9 @@ from potto.core.terms import (
     sub,
 )
 
+Box = Mapping[str, tuple[float, float]]  # the ranges of variables
+_ANYWHERE: Box = {}
+
 _MONOMIALS = 6  # of what is written anew between its bounds
 _COEFFICIENT = 64  # the largest; multiples of decimal fractions are no plainer
 
@@ -65,12 +68,12 @@ def conditions(term: Term) -> list[Condition] | None:
     return found
 
 
-def fewer(known: Iterable[Condition]) -> list[Condition]:
+def fewer(known: Iterable[Condition], box: Box = _ANYWHERE) -> list[Condition]:
     """The same conditions without what is said twice or follows from another one; of two that exclude each other none
-    is left but that which never holds."""
+    is left but that which never holds. box: the ranges of variables."""
     found: list[Condition] = []
     for item in known:
-        for plain in _plain(item):
+        for plain in _plain(item, box):
             if any(_excludes(other, plain) for other in found):
                 return [NEVER]
             if not any(_implies(other, plain) for other in found):
@@ -142,7 +145,7 @@ def _surface(bound: _Bound) -> Term | None:
     return sub(taken, added) if bound.turned else sub(added, taken)
 
 
-def plainer(surface: Term, box: Mapping[str, tuple[float, float]]) -> Term | None:
+def plainer(surface: Term, box: Box) -> Term | None:
     """A surface of the same sign in the box, without factors whose sign is known there: s < 1 for s*x < x where x goes
     from 0 to 1. None if there are none. Where a variable of the box is 0 a surface may have been 0 as well; that is
     nothing to an integral over it."""
@@ -191,7 +194,7 @@ def opposite(first: Condition, second: Condition) -> bool:
     return first.strict and second.strict and found is not None and not found.top
 
 
-def _plain(item: Condition) -> list[Condition]:
+def _plain(item: Condition, box: Box) -> list[Condition]:
     """A condition as conditions without roots, and without factors whose sign is known; none if it always holds."""
     found = normal(item.surface)
     if found is None:
@@ -202,15 +205,15 @@ def _plain(item: Condition) -> list[Condition]:
     if not found.top:
         return [item]
     if found.whole:
-        without_root = _squared(found.top, item.strict) or _odd_root(found.top, item.strict)
+        without_root = _squared(found.top, item.strict, box) or _odd_root(found.top, item.strict)
         if without_root is not None:
-            return [each for one in without_root for each in _plain(one)]
+            return [each for one in without_root for each in _plain(one, box)]
     if len(found.top) == 1:
-        return _without_even(item, found.top, found.below)
+        return _without_even(item, found.top, found.below, box)
     return [item]
 
 
-def _squared(form: Polynomial, strict: bool) -> list[Condition] | None:
+def _squared(form: Polynomial, strict: bool, box: Box) -> list[Condition] | None:
     """k*sqrt(u) + rest > 0 by squares, where the sign of the rest is known."""
     roots = [(m, c) for m, c in form.items() if any(isinstance(a, Prim) and a.op == "sqrt" for a, _ in m)]
     if len(roots) != 1:
@@ -227,12 +230,16 @@ def _squared(form: Polynomial, strict: bool) -> list[Condition] | None:
         return None
     exists = Condition(inside, False)
     if scale < 0:  # sqrt(u) < rest
-        return [exists, Condition(sub(inside_square(rest), inside), strict)] if range_of(rest).lo >= 0 else None
+        return (
+            [exists, Condition(written_out(sub(mul(rest, rest), inside)), strict)]
+            if range_of(rest, box).lo >= 0
+            else None
+        )
     if rest is ZERO:
         return [Condition(inside, strict)]
-    if range_of(rest).lo >= 0:
+    if range_of(rest, box).lo >= 0:
         return [exists]
-    return [Condition(sub(inside, inside_square(rest)), strict)] if range_of(rest).hi <= 0 else None
+    return [Condition(written_out(sub(inside, mul(rest, rest))), strict)] if range_of(rest, box).hi <= 0 else None
 
 
 def _odd_root(form: Polynomial, strict: bool) -> list[Condition] | None:
@@ -254,14 +261,14 @@ def _odd_root(form: Polynomial, strict: bool) -> list[Condition] | None:
     return [Condition(sub(u, bound) if scale > 0 else sub(bound, u), strict)]
 
 
-def inside_square(term: Term) -> Term:
-    """Its square, written out."""
-    found = normal(mul(term, term))
-    written = None if found is None else as_term(found.top)
-    return mul(term, term) if written is None else written
+def written_out(term: Term) -> Term:
+    """The same as a sum, if it is one of polynomials."""
+    found = normal(term)
+    written = as_term(found.top) if found is not None and found.whole else None
+    return term if written is None else written
 
 
-def _without_even(item: Condition, top: Polynomial, below: Polynomial) -> list[Condition]:
+def _without_even(item: Condition, top: Polynomial, below: Polynomial, box: Box) -> list[Condition]:
     """Of a product only the factors that change its sign."""
     ((monomial, scale),) = top.items()
     if not item.strict and not set(below) - {()} and len(monomial) == 1 and monomial[0][1] == 1:
@@ -269,7 +276,7 @@ def _without_even(item: Condition, top: Polynomial, below: Polynomial) -> list[C
     if len(below) != 1 or not item.strict:
         return [item]
     ((under, _),) = below.items()
-    odd = [a for a, n in (*monomial, *under) if n % 2 and not range_of(a).positive]
+    odd = [a for a, n in (*monomial, *under) if n % 2 and not range_of(a, box).positive]
     if not odd:
         return [] if scale > 0 else [NEVER]
     whole = mul(*odd)
@@ -285,8 +292,6 @@ def _excludes(first: Condition, second: Condition) -> bool:
 
 
 def _implies(first: Condition, second: Condition) -> bool:
-    """Whether the second holds wherever the first does: its surface is the other's and a number that is not below 0."""
-    offset = constant(sub(second.surface, first.surface))
-    if offset is None:
-        return False
-    return offset > 0 or (offset == 0 and (first.strict or not second.strict))
+    """Whether the second holds wherever the first does: its surface is the other's and what is never below 0."""
+    more = range_of(written_out(sub(second.surface, first.surface)))
+    return more.lo > 0 or (more.lo == 0 and (first.strict or not second.strict))

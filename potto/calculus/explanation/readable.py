@@ -36,12 +36,14 @@ from potto.core.terms import (
     const,
     div,
     if_,
+    integral,
     mul,
     neg,
     postorder,
     pow_,
     prim,
     rebuild,
+    sub,
     substitute,
     transform,
     var,
@@ -127,7 +129,7 @@ def _decided(term: Term, box: Box, work: _Work) -> Term:
 def _inside(node: Integral, box: Box, work: _Work) -> Term:
     inner = {**box, **box_of(node)}
     parts = children(node)
-    return rebuild(node, tuple(_decided(part, inner if part is node.body else box, work) for part in parts))
+    return work.node(rebuild(node, tuple(_decided(part, inner if part is node.body else box, work) for part in parts)))
 
 
 def _undecided(node: Term, known: Mapping[Term, Term], box: Box, work: _Work) -> Term:
@@ -139,6 +141,9 @@ def _undecided(node: Term, known: Mapping[Term, Term], box: Box, work: _Work) ->
             return taken
         if len(new.coordinates) == 1 and (surface := plainer(new.surface, box)) is not None:
             new = branch((surface,), new.strict, new.then, new.orelse)
+        held = conditions(new) if box else None
+        if held is not None and set(plain := fewer(held, box)) != set(held):
+            new = bracket_of(plain[::-1])  # the outermost is asked first
     return new if new is node else work.node(new)
 
 
@@ -184,8 +189,26 @@ class _Work:
                 return _length(node)
             case Integral(body=Prim(op="neg", args=(inner,))):
                 return neg(with_integrand(node, inner))
+            case Integral():
+                return self._over_few(node)
             case _:
                 return node
+
+    def _over_few(self, node: Integral) -> Term:
+        """An integral over the variables that something in it depends on, times the lengths of the others."""
+        if node.body is ZERO:
+            return ZERO
+        named = node.body.free.union(*(bound.free for pair in node.bounds for bound in pair))
+        rows = list(zip(node.variables, node.bounds, node.hints, strict=True))
+        idle = [row for row in rows if row[0] not in named and not any(map(_is_endless, row[1]))]
+        if not idle:
+            return node
+        body = self.node(mul(*(sub(hi, lo) for _, (lo, hi), _ in idle), node.body))
+        left = [row for row in rows if row not in idle]
+        if not left:
+            return body
+        variables, bounds, hints = zip(*left, strict=True)
+        return self.node(integral(variables, bounds, body, hints))
 
     def _shortest(self, node: Prim) -> Term:
         """The shortest of: the product of its factors, and the node expanded, with the sums in it or around them."""
@@ -338,6 +361,10 @@ def _length(node: Prim) -> Term:
         if scale == 1 and monomial and all(n % 2 == 0 for _, n in monomial):
             return prim("abs", mul(*(pow_(a, const(n / 2)) for a, n in monomial)))
     return prim("hypot", *sides)
+
+
+def _is_endless(bound: Term) -> bool:
+    return isinstance(bound, Const) and not isfinite(bound.value)
 
 
 def _is_negative(term: Term) -> bool:
