@@ -18,6 +18,7 @@ from potto.kernels.errors import wrong_call
 from potto.python.arguments import batch_of
 from potto.python.functions import Function, bound, deriv
 from potto.python.gradients import Gradient, Names, grad, in_given_form, parameters_to_vary
+from potto.python.moving import PRIMAL
 from potto.python.remade import remade
 from potto.runtime.answers.estimate import Estimate, OneSided
 
@@ -111,13 +112,16 @@ def _cell(part: Any) -> Any:
 
 
 def _twice(function: Function, names: tuple[str, ...]) -> Callable[[dict[str, Any], Mapping[str, Any]], Gradient]:
-    """From arguments, and a direction, to the gradient of the derivative along it."""
+    """From arguments, and a direction, to the derivatives of (f, f' v) by the numbers that are named."""
     once = deriv(function)
     duals = dict(zip(function.parameters, once.parameters, strict=True))
-    gradient = grad(once, [duals[name] for name in names])
+    moving = tuple(duals[name] + PRIMAL for name in names)
 
     def found(given: dict[str, Any], along: Mapping[str, Any]) -> Gradient:
-        return gradient(**{duals[name]: _dual(argument, along.get(name)) for name, argument in given.items()})
+        pairs = {duals[name]: _dual(argument, along.get(name)) for name, argument in given.items()}
+        gradient = once.in_tiles((), pairs, moving)
+        assert isinstance(gradient, Gradient)
+        return gradient
 
     return found
 
@@ -182,31 +186,31 @@ def _leaves(argument: Any, batch: int) -> Iterator[Any]:
 
 
 def _product(found: Gradient, given: Mapping[str, Any], names: tuple[str, ...]) -> Gradient:
-    """Of the derivatives of (f, f' v) by each parameter and its tangent, those of f' v by the parameter."""
+    """Of the derivatives of (f, f' v), those of f' v."""
 
     def part(tangents: Any) -> Any:
         items = tangents if len(names) > 1 else (tangents,)
-        parts = tuple(_last(item[0], given[name]) for item, name in zip(items, names, strict=True))
+        parts = tuple(_last(item, given[name]) for item, name in zip(items, names, strict=True))
         return parts if len(names) > 1 else parts[0]
 
+    count = sum(_count(given[name]) for name in names)
     return replace(
         found, value=found.value[0], error=found.error[0], tangent=part(found.tangent),
-        tangent_error=part(found.tangent_error), wrt=names, notes=_own_notes(found, [_count(given[n]) for n in names]),
+        tangent_error=part(found.tangent_error), wrt=names, notes=_own_notes(found, count),
     )  # fmt: skip
 
 
-def _own_notes(found: Gradient, counts: list[int]) -> tuple[OneSided, ...]:
-    """Of notes on (f, f' v) by each parameter and its tangent, what they say of f' v by the parameters of these sizes.
+def _own_notes(found: Gradient, count: int) -> tuple[OneSided, ...]:
+    """Of notes on (f, f' v) by so many numbers, what they say of f' v.
 
     It may be one number to both sides: then there is nothing to note.
     """
-    batch = np.shape(found.value[0])
-    own = np.concatenate([np.repeat([True, False], count) for count in counts])
+    batch, size = np.shape(found.value[0]), 2 * count * np.prod(np.shape(found.value[0]))
     notes = []
     for note in found.notes:
         sides = [np.asarray(side) for side in (note.backward, note.forward, note.backward_error, note.forward_error)]
-        if sides[0].size == 2 * own.size * np.prod(batch):  # else it is of one integral, by what that depends on
-            sides = [np.squeeze(side.reshape(2, own.size, *batch)[1][own]) for side in sides]
+        if sides[0].size == size:  # else it is of one integral, by what that depends on
+            sides = [np.squeeze(side.reshape(2, count, *batch)[1]) for side in sides]
         backward, forward, before, beyond = sides
         if not np.array_equal(backward, forward) or not np.isfinite(backward).all():
             notes.append(replace(note, backward=backward, forward=forward, backward_error=before, forward_error=beyond))

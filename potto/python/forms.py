@@ -39,7 +39,7 @@ def bounds_of(cell: Cell) -> tuple[Number | None, ...]:
     return cell.et
 
 
-def by_name(numbers: list[Any], wrt: tuple[str, ...], given: dict[str, Value], whole: bool) -> tuple[Any, ...]:
+def by_name(numbers: list[Any], given: dict[str, Value], whole: bool) -> tuple[Any, ...]:
     """The derivatives in the form of the parameters; `whole`: those by all elements of an array are one array."""
     rest = iter(numbers)
 
@@ -52,7 +52,7 @@ def by_name(numbers: list[Any], wrt: tuple[str, ...], given: dict[str, Value], w
             return [form(row) for row in value.rows()]
         return _by_elements(value, [next(rest) for _ in all_cells(value)])
 
-    return tuple(form(given[name]) for name in wrt)
+    return tuple(form(value) for value in given.values())
 
 
 def _by_elements(value: Rows, slopes: list[Any]) -> list[Any]:

@@ -26,7 +26,7 @@ from potto.python.calls import Call
 from potto.python.described import typeset_derivative
 from potto.python.forms import as_matrix, bounds_of, by_name, in_lists, must_match, tangents_of, weighted
 from potto.python.functions import Function, bound, must_be_function
-from potto.python.moving import each_moving, moved, size, with_places
+from potto.python.moving import each_moving, moved, own, size, with_own, with_places
 from potto.python.remade import remade
 from potto.python.sided import with_sides
 from potto.runtime.answers.estimate import Estimate
@@ -42,6 +42,7 @@ from potto.types.types import REAL
 # whatever their number, tangents 1.6 at 4 and, where all depends on all, 2.7 at 12 and 4.8 at 64; the first call costs
 # half as much from 8 on (`benchmarks/gradients.py ways`). What integrals carry is the same either way.
 MANY = 12
+SWEEP = 6  # tangents that cost what a sweep does, of which each number of an answer takes one
 NOTHING: Swept = (None, None)
 Names = Sequence[str] | str | None
 
@@ -119,8 +120,9 @@ def value_and_jacobian(function: Function, wrt: Names = None) -> Callable[..., t
             for side in (tangents_of, bounds_of)
         )
         found = run.answer(value, tangents, bounds)
-        single = isinstance(value, Cell), len(names) == 1 and isinstance(run.given[names[0]], Cell)
-        count = sum(size(name, run.given[name]) for name in names)
+        own = run.own(*names)
+        single = isinstance(value, Cell), len(names) == 1 and isinstance(own[names[0]], Cell)
+        count = sum(size(name, value) for name, value in own.items())
         slopes, errors = (as_matrix(part, count, run.batch, *single) for part in (found.tangent, found.tangent_error))
         plain = replace(found, tangent=None, tangent_error=None)
         return plain, replace(plain, value=slopes, error=errors)
@@ -171,7 +173,7 @@ def jvp(function: Function, along: Mapping[str, Any], *tangents: Any) -> Callabl
         }
         run = _Run(*function.prepared(args, kwargs, labels), labels)
         tangents = dict(zip(names, run.extra.values(), strict=True))
-        moving = {name: moved(name, run.own(name), tangents[name]) for name in names}
+        moving = {name: moved(name, value, tangents[name]) for name, value in run.own(*names).items()}
         value = run.evaluated(moving, run.machine.with_directions(1), lambda value: value)
         return named_answer(run.batch.shaped(report(value, run.machine, run.clock)), run.call.result)
 
@@ -270,9 +272,11 @@ class _Run:
     def along_each(self, wrt: tuple[str, ...]) -> Value:
         """The value, with a tangent for each number of the parameters named."""
 
+        directions = sum(size(name, value) for name, value in self.own(*wrt).items())
+
         def swept_back(value: Value, seeds: Sequence[Node]) -> Value:
-            if len(all_cells(value)) > len(seeds):
-                raise Untaped  # a sweep for each number of the answer would cost more than a tangent for each parameter
+            if len(all_cells(value)) * SWEEP > directions:
+                raise Untaped
             return map_cells(value, lambda cell: Cell(cell.v, cell.e, *_swept([(cell, 1.0)], seeds)))
 
         return self._differentiated(wrt, swept_back, lambda value: value)
@@ -298,7 +302,8 @@ class _Run:
         forward: Callable[[Value], Value],
     ) -> Value:  # fmt: skip
         """What one of these makes of the value: of a tape with its seeds, or of tangents."""
-        directions = sum(size(name, self.own(name)) for name in wrt)
+        own = self.own(*wrt)
+        directions = sum(size(name, value) for name, value in own.items())
         shape = () if self.batch.shape is None else (max(1, int(np.prod(self.batch.shape))),)
         if directions >= MANY and np.prod(shape) <= POINTS:  # a tape keeps arrays for all operations
             seeds: list[Any] = []
@@ -307,31 +312,31 @@ class _Run:
                 seeds.append(Node((), (*places, *shape)))
                 return Cell(cell.v, cell.e, (seeds[-1],))
 
-            moving = {name: with_places(self.given[name], (), seeded) for name in wrt}
+            moving = {name: with_places(value, (), seeded) for name, value in own.items()}
             self.whole = True
             try:
                 found = self.evaluated(moving, self.machine.taped(), lambda value: swept_back(value, seeds))
-                return found if not self.machine.record.edges else self._with_sides(found, wrt, seeds, forward)
+                return found if not self.machine.record.edges else self._with_sides(found, own, seeds, forward)
             except Untaped:
                 pass
             self.machine, self.whole = self._machine(), False
         numbers = iter(range(directions))
-        moving = {name: each_moving(self.given[name], numbers, directions) for name in wrt}
+        moving = {name: each_moving(value, numbers, directions) for name, value in own.items()}
         return self.evaluated(moving, self.machine.with_directions(directions), forward)
 
     def _with_sides(
-        self, found: Value, wrt: tuple[str, ...], seeds: Sequence[Node], forward: Callable[[Value], Value]
+        self, found: Value, own: dict[str, Value], seeds: Sequence[Node], forward: Callable[[Value], Value]
     ) -> Value:
         def run(moving: dict[str, Value], directions: int) -> tuple[Value, Record]:
             machine = self._machine().with_directions(directions)
             return self.evaluated(moving, machine, forward), machine.record
 
-        return with_sides(found, self.machine.record, {name: self.given[name] for name in wrt}, seeds, run)
+        return with_sides(found, self.machine.record, own, seeds, run)
 
     def evaluated(self, moving: Mapping[str, Value], machine: Machine, ended: Callable[[Value], Value]) -> Value:
         """What `ended` makes of the value that this machine finds where these parameters move."""
         k = machine.directions
-        values = [moving[name] if name in moving else pad(value, k) for name, value in self.arguments]
+        values = [pad(with_own(name, value, moving), k) for name, value in self.arguments]
         self.moved = values, machine
         with self.clock:
             value = in_lists(as_a_whole(machine, self.call.elaborated, tuple(values), self.called))
@@ -344,11 +349,9 @@ class _Run:
         assert isinstance(values, tuple)
         return self.call.value(values, machine)
 
-    def own(self, name: str) -> Value:
-        """What a parameter is given. Raises PottoError if that is nothing."""
-        if name not in self.given:
-            raise wrong_call(f"`{name}` is given no value, so there is nothing to differentiate by")
-        return self.given[name]
+    def own(self, *names: str) -> dict[str, Value]:
+        """What is differentiated by, as it is given. Raises PottoError if that is nothing."""
+        return {name: own(name, self.given) for name in names}
 
     def keep(self, found: Estimate, wrt: tuple[str, ...]) -> None:
         """Keep what answers a call of this kind at once, if anything does."""
@@ -367,16 +370,17 @@ class _Run:
         def flat(form: Any) -> list[Any]:
             return [x for item in form for x in flat(item)] if isinstance(form, tuple | list) else [form]
 
-        return tuple(flat(by_name(slopes, names, self.given, self.whole)))
+        return tuple(flat(by_name(slopes, self.own(*names), self.whole)))
 
     def gradient(self, value: Value, moving: Value, wrt: tuple[str, ...]) -> Gradient:
         """The estimate of a value, with the derivatives of `moving` in the form of the parameters."""
-        directions = range(len(all_cells(tuple(self.given[name] for name in wrt))) if self.whole
-                           else sum(size(name, self.given[name]) for name in wrt))  # fmt: skip
+        own = self.own(*wrt)
+        directions = range(len(all_cells(tuple(own.values()))) if self.whole
+                           else sum(size(name, value) for name, value in own.items()))  # fmt: skip
         form = self.call.result if moving is value else REAL
         tangents = [named(told(moving, lambda cell, d=d: cell.t[d]), form) for d in directions]  # type: ignore[misc]
         bounds = [told(moving, lambda cell, d=d: bar(cell.et[d])) for d in directions]  # type: ignore[misc]
-        forms = (by_name(part, wrt, self.given, self.whole) for part in (tangents, bounds))
+        forms = (by_name(part, own, self.whole) for part in (tangents, bounds))
         found = self.answer(value, *(form[0] if len(wrt) == 1 else form for form in forms))
         return Gradient(**asdict(found), wrt=wrt)
 

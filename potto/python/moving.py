@@ -1,15 +1,40 @@
 """Parameters that move: each number of them along a direction of its own, or all along a tangent.
 
-Owns `size`, `each_moving`, `with_places` and `moved`.
+Owns `size`, `each_moving`, `with_places` and `moved`; `PRIMAL`, `own` and `with_own`: names for what moves. `p` names a
+parameter, and `p.0` the number of one that is a number and its tangent.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 
 from potto.kernels.cells import Cell, Rows, Value, listed
 from potto.kernels.errors import wrong_call
 from potto.python.forms import form_of
+
+PRIMAL = ".0"
+
+
+def own(name: str, given: Mapping[str, Value]) -> Value:
+    """What a name stands for. Raises PottoError if its parameter is given nothing."""
+    parameter = name.removesuffix(PRIMAL)
+    if parameter not in given:
+        raise wrong_call(f"`{name}` is given no value, so there is nothing to differentiate by")
+    value = given[parameter]
+    if parameter == name:
+        return value
+    assert isinstance(value, tuple)
+    return value[0]
+
+
+def with_own(name: str, given: Value, moving: Mapping[str, Value]) -> Value:
+    """A parameter where this moves, by names."""
+    if name in moving:
+        return moving[name]
+    if name + PRIMAL not in moving:
+        return given
+    assert isinstance(given, tuple)
+    return moving[name + PRIMAL], *given[1:]
 
 
 def size(name: str, value: Value) -> int:

@@ -150,3 +150,32 @@ def test_samples(method: Any) -> None:
     wanted[1] += AT[0] ** 2 / 2
     off = np.abs(np.array(found.tangent) - wanted)
     assert np.all(off <= 5 * np.array(found.tangent_error) + 1e-14)  # a drawn error is one standard deviation or two
+
+
+SUMS = """
+def corner(a) integral ([0, 1], [0, 1]) [x + y < a] d(x, y)
+def squares(p: [n] Real) sum i in 0..n - 1 (corner(p[i])^2)
+def nested(p: [n] Real) sum i in 0..n - 1 (sum j in 0..n - 1 (p[i]*corner(p[j])))
+def as_many(a, m) sum i in 1..m (corner(a/i)^2)
+def powers(p: [n] Real) (sum i in 0..n - 1 (p[i]^2), sum i in 0..n - 1 (p[i]^3))
+"""
+
+
+def test_hessians_of_sums() -> None:
+    """Values and tangents of a sum are added up in one go, so that what it calls is evaluated once for both.
+
+    Corners of triangles a^2/2. For each integral there are its value, and two of its boundary for those members that
+    are solved for either variable, of which here is one: three times the value's evaluations at most.
+    """
+    m, p, v = potto.compile(SUMS), np.linspace(0.2, 0.9, 30), np.cos(np.arange(30.0))
+    plain, found = m.squares(p), potto.hvp(m.squares, {"p": v})(p)
+    within(found.tangent, found.tangent_error, 3 * p**2 * v)
+    assert found.converged and found.evals <= 3 * plain.evals
+    found = potto.hvp(m.nested, {"p": v})(p)
+    within(found.tangent, found.tangent_error, (p * v).sum() + p * v.sum() + p.sum() * v)
+    assert [potto.hvp(m.as_many, {"a": 1.0})(0.6, count).tangent for count in (0.0, 1.0)] == [0.0, pytest.approx(1.08)]
+
+
+def test_two_answers_by_an_array() -> None:
+    found = potto.grad(potto.compile(SUMS).powers)(p := np.linspace(0.2, 0.9, 30))
+    within(found.tangent, found.tangent_error, np.stack([2 * p, 3 * p**2], axis=-1))

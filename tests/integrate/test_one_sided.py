@@ -247,3 +247,13 @@ def test_members_at_which_an_ellipse_appears_are_looked_at_by_themselves(backend
     (note,) = r.notes
     assert np.flatnonzero(np.isfinite(note.forward)).tolist() == [*range(7, 600, 100)]
     assert np.abs(note.forward[7::100] + math.pi).max() < 1e-8
+
+
+@pytest.mark.parametrize("count", [3, 40])
+def test_members_of_a_batch_on_a_bound_tell_what_each_tells_alone(count: int) -> None:
+    """Few members, which may be proved one by one, and many: of x < t at t = 1 the derivative is 2w before and w
+    beyond, as 1 + t - x is 1 there and its own slope w (closed form, to rounding)."""
+    f = potto.compile("def f(t, w) integral [0, 1] [x < t]*w*(1 + t - x) d(x)").f
+    w = np.arange(1.0, count + 1)
+    (note,) = potto.grad(f, "t")(np.ones(count), w).notes
+    assert note.backward == pytest.approx(2 * w, rel=1e-13) and note.forward == pytest.approx(w, rel=1e-13)

@@ -39,8 +39,10 @@ def array(machine: Machine, term: ArrayTerm, size: Value, env: Env) -> Value:
         return Rows(Cell(np.zeros(0), None, (None,) * machine.directions), 0)
     places = np.arange(count, dtype=float).reshape(count, *(1,) * len(shape))
     here = {**env, term.variable: Cell(places, None, (None,) * machine.directions)}
+    met = machine.record.met
     with looked_through(SHORT):
         value = machine.run(body, [here[name] for name in params], None)
+    machine.record.spread(met)
     if holds_functions(value):
         return _one_by_one(machine, body, count, env, term.variable)
     return Rows(_in_front(value, count, shape, 0), count)

@@ -159,6 +159,10 @@ class Record(Struct):
         self.met += known
         return known
 
+    def spread(self, met: int) -> None:
+        """What was met since `met` is told of terms or of elements, and of no member alone."""
+        self.met += self.met != met
+
     def sided(self, met: int, known: int) -> Any:
         """Which members have met something with two derivatives since `met` and this many edges: all, where that is
         not told."""

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 from potto.calculus.differentiation.derivative import NotSmooth
 from potto.calculus.differentiation.dual import dual_function as symbolic
+from potto.calculus.inlining.joint_sums import with_joint_sums
 from potto.calculus.solving.pivots import NoClosedForm
-from potto.core.terms import Global, Lam, Term
+from potto.core.terms import Global, Lam, Term, lam
 from potto.diagnostics import PottoError
 from potto.kernels import errors
 from potto.runtime.evaluation.functions import Closure, Derivative, Paired
@@ -35,10 +36,11 @@ def _dual(machine: Machine, function: Lam) -> Lam:
             return machine.linker.term(name.module, name.name)
 
         try:
-            known = symbolic(function, resolve, machine.frozen)
+            found = symbolic(function, resolve, machine.frozen)
         except (NoClosedForm, NotSmooth) as reason:
             raise PottoError([NOT_COUNTED(
                 errors.NOWHERE, f"no second derivative was found: {reason}", help="differentiate only once",
             )]) from None  # fmt: skip
+        known = lam(found.params, with_joint_sums(found.body))
         machine.linker.duals[function, machine.frozen] = known
     return known

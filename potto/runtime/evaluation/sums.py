@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from potto.calculus.inlining.lattices import REACH, middle
-from potto.core.terms import Sum, lam
+from potto.core.terms import Sum, Tuple, lam
 from potto.diagnostics import PottoError
 from potto.kernels import errors
 from potto.kernels.cells import Cell, Number, Rows, Trace, Value, all_arrays, combined, listed, map_arrays, map_cells
@@ -29,7 +29,7 @@ def total(machine: Machine, term: Sum, lo: Value, hi: Value, env: dict[str, Valu
     if isinstance(first, np.ndarray) or isinstance(last, np.ndarray):
         return _grouped(machine, term, first, last, env)
     if last < first:
-        return Cell(0.0)
+        return tuple(Cell(0.0) for _ in term.body.items) if isinstance(term.body, Tuple) else Cell(0.0)
     if last - first >= MOST_TERMS:
         raise PottoError([errors.BAD_SUM(errors.NOWHERE, f"a sum of {last - first + 1:.0f} terms is too long")])
     params = tuple(sorted(term.body.free | {term.variable}))
@@ -49,7 +49,7 @@ def total(machine: Machine, term: Sum, lo: Value, hi: Value, env: dict[str, Valu
             return found
     step = max(1, CHUNK // max(1, int(np.prod(shape))))
     machine = machine if shape else machine.changed(summed=True)
-    result: Value | None = None
+    met, result = machine.record.met, None
     for start in range(int(first), int(last) + 1, step):
         index = np.arange(start, min(start + step, int(last) + 1), dtype=float)
         wide[term.variable] = Cell(index, None, (None,) * machine.directions)
@@ -57,6 +57,7 @@ def total(machine: Machine, term: Sum, lo: Value, hi: Value, env: dict[str, Valu
             value = machine.run(body, [wide[p] for p in params], None)
         part = _reduce(value, shape, index.size)
         result = part if result is None else _plus(result, part)
+    machine.record.spread(met)
     assert result is not None
     return result
 

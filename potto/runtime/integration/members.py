@@ -103,6 +103,7 @@ def _proved(problem: Problem, found: Whole) -> Ints:
         if sums is None:
             return everybody[i:]
         found.put(one, sums)
+        problem.events.take(single.events, one)
     return everybody[:0]
 
 
