@@ -1,8 +1,8 @@
 """A workspace like a large project of one's own: 200 modules, 42,000 lines, one module of 2,000.
 
-Owns `workspace`, without arrays and with them, `resigned` and `written`. Definitions are of the size of those in the
-paper and in `examples/`: shaders, small integrals with a condition, helpers, documented; a module imports a few others
-that come before it, so that there are leaves, a middle and a top, and no cycles.
+Owns `workspace`, without arrays and with them, `resigned`, `longer` and `written`. Definitions are of the size of those
+in the paper and in `examples/`: shaders, small integrals with a condition, helpers, documented; a module imports a few
+others that come before it, so that there are leaves, a middle and a top, and no cycles.
 """
 
 from __future__ import annotations
@@ -143,6 +143,13 @@ def resigned(leaf: str, number: int | None) -> tuple[str, str]:
             other = re.sub(r"\bk\b", k, re.sub(r"\bt\b", t, other))
         fitting += other
     return re.sub(rf"(?m)^(def f[01]\({t}), {k}\)", r"\1)", fitting), fitting
+
+
+def longer(leaf: str, number: int) -> str:
+    """The leaf with six more parameters in the signatures that its importers call, of types as no other number has."""
+    types = ("(Real, Real)" if number >> n & 1 else "Real" for n in range(6))
+    more = "".join(f", more{n}: {type}" for n, type in enumerate(types))
+    return re.sub(r"(?m)^(def f[01]\(t, k)\)", rf"\1{more})", leaf)
 
 
 @contextmanager

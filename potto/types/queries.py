@@ -24,6 +24,7 @@ from potto.types.analysis import Analysis, Typed, analyse, local_type, parts, ty
 from potto.types.context import Inference, Part, ensure_stack
 from potto.types.flow import Walk
 from potto.types.flow_binders import walk_statement
+from potto.types.hidden_names import only_called, with_names, without_names
 from potto.types.integrals import statement as infer_statement
 from potto.types.interfaces import Interface, unknown_interface
 from potto.types.lints import lints
@@ -50,6 +51,12 @@ def interface(db: Database, file: str, name: str) -> Interface:
 
 
 @query(travels=True, cuts=True)
+def called(db: Database, file: str, name: str) -> Interface:
+    """The interface of a definition for whoever only calls it, by place: with signs for the names of parameters."""
+    return without_names(interface(db, file, name), DefinitionTarget(file, name))
+
+
+@query(travels=True, cuts=True)
 def shape(db: Database, file: str, name: str) -> Type:
     """The type of a definition as far as it decides what calls are made of: without the names of its parameters, and
     without what varies with what. Most edits of a definition leave it as it is."""
@@ -59,7 +66,13 @@ def shape(db: Database, file: str, name: str) -> Type:
 def check_definition(db: Database, file: str, name: str) -> tuple[Diagnostic, ...]:
     """What is wrong with a definition. Spans are relative to its chunk."""
     found = _analysis(db, file, name)
-    return () if found is None else found.diagnostics
+    if found is None or not found.diagnostics:
+        return ()
+    told = with_names(found.diagnostics, lambda target: sum(interface(db, target.file, target.name).groups, ()))
+    if told is None:  # a name was cut off
+        known = db.entry(_details, (_group(db, file, name),), DefinitionTarget(file, name))
+        told = () if known is None else known.diagnostics
+    return told
 
 
 @query
@@ -116,7 +129,10 @@ def _analysed(db: Database, group: tuple[DefinitionTarget, ...], details: bool) 
         item = definition(db, target.file, target.name)
         if item is not None:
             items[target] = item
-    outsides = {target: _outside(db, target.file, references(db, target.file, target.name), items) for target in items}
+    outsides = {
+        target: _outside(db, target.file, references(db, target.file, target.name), items, None if details else item)
+        for target, item in items.items()
+    }
     broken = frozenset(target for target in items if _broken(db, target.file, target.name))
     return analyse(items, outsides, broken, details)
 
@@ -129,19 +145,27 @@ def _broken(db: Database, file: str, name: str) -> bool:
 
 
 def _outside(
-    db: Database, file: str, used: Sequence[tuple[str | None, str]], group: Sequence[DefinitionTarget] | object = ()
-) -> Outside:
-    """What a file provides under the names that are used."""
+    db: Database, file: str, used: Sequence[tuple[str | None, str]], group: Sequence[DefinitionTarget] | object = (),
+    caller: nodes.Definition | nodes.DiffeoDefinition | None = None,
+) -> Outside:  # fmt: skip
+    """What a file provides under the names that are used. What a caller does nothing with but call it has no names of
+    parameters for it."""
     known: dict[tuple[str | None, str], Meaning] = {}
+    nameless: frozenset[tuple[str | None, str]] | None = frozenset() if caller is None else None
     for path, name in used:
         target = refer(db, file, path, name)
         if path is not None and target is not None and resolve_member(db, file, path, name) is None:
             name, path = path.partition(".")[0], None  # a field of a definition
         if isinstance(target, ModuleTarget):
             known[path, name] = Module(name)
+        elif target is not None and isinstance(group, dict) and target in group:
+            known[path, name] = Member(target)
         elif target is not None:
-            inside = isinstance(group, dict) and target in group
-            known[path, name] = Member(target) if inside else Global(target, interface(db, target.file, target.name))
+            if nameless is None:
+                assert caller is not None
+                nameless = only_called(caller)
+            of = called if (path, name) in nameless else interface
+            known[path, name] = Global(target, of(db, target.file, target.name))
     return Outside(db, file, lambda target: plain_reasons(db, target.file, target.name), known)
 
 

@@ -147,3 +147,35 @@ def test_recursion_across_modules() -> None:
     assert format_type(interface(db, MAIN, "odd").type) == "(n: Real) -> Real"
     assert format_type(interface(db, LIB, "even").type) == "(n: Real) -> Real"
     assert diagnostics(db) == diagnostics(db, "lib.po") == []
+
+
+def renamed(db: Database, text: str, old: str, new: str) -> tuple[list[str], list[object]]:
+    """The definitions that are analysed again after an edit, and what is said then; it is what is said from scratch."""
+    load(db, text)
+    snapshot(db)
+    with db.recording():
+        load(db, text.replace(old, new))
+        found = snapshot(db)
+        again = analysed(db)
+    assert found == snapshot(database(text.replace(old, new)))
+    return again, found
+
+
+def test_a_parameter_that_is_renamed_is_told_to_callers_without_a_new_analysis() -> None:
+    db = database(PROGRAM)
+    text = PROGRAM.replace("soft(x - t)", "soft(x - t, 1)").replace("2*g(t)", "2*g((t, t))").replace("f(t)*", "f()*")
+    again, found = renamed(
+        db, text.replace("def g(t) f()*step(t)", "def g(t) f()*step(t, 1)"), "def soft(y) [y", "def soft(y2) [y2"
+    )
+    assert again == ["soft"] and "its parameters are (y2)" in str(found)
+    again, found = renamed(db, text, "def g(t) f()*step(t)", "def g(tau) f()*step(tau)")
+    assert again == ["g"] and "`tau` of `g` must be" in str(found)
+
+
+def test_who_needs_the_names_of_parameters_sees_them_change() -> None:
+    for uses in ("h(t) 2*g(t=t)", "h(t) 2*fst(deriv(g)((t, 1)))", "h = g", "h(t) let k = g in k(t)"):
+        text = PROGRAM.replace("h(t) 2*g(t)", uses)
+        if uses.startswith("h = "):
+            text = text.replace("def h", "h")
+        again, _ = renamed(database(text), text, "def g(t) f(t)*step(t)", "def g(tau) f(tau)*step(tau)")
+        assert again == ["g", "h"]
