@@ -67,7 +67,7 @@ def call(elaboration: Elaboration, function: Value, given: Arguments, span: Span
     match function:
         case Closure():
             return _call_closure(elaboration, function, given, span)
-        case Builtin(name):
+        case Builtin(name=name):
             if any(argument.name is not None for argument in given):
                 return hole(f"the parameters of `{name}` have no names")
             if name in VECTORS:
@@ -163,12 +163,12 @@ def _is_number(elaboration: Elaboration, arg: Term) -> bool:
 def _values(elaboration: Elaboration, count: int, filling: Filling[Value]) -> tuple[Value, ...]:
     """What the parameters of one group get."""
     match filling:
-        case Spread(value):
+        case Spread(value=value):
             whole = elaboration.as_term(value)
             if isinstance(whole, Tuple) and len(whole.items) != count:
                 return (hole(f"{count} parameters for a tuple of {len(whole.items)}"),) * count
             return tuple(proj(whole, place) for place in range(count))
-        case Packed(values):
+        case Packed(values=values):
             return (tuple_(map(elaboration.as_term, values)),)
         case _:
             return filling

@@ -141,7 +141,7 @@ class Elaboration:
                 if found is None:
                     found = self.made[value] = self.function(value)
                 return found
-            case Builtin(name):
+            case Builtin(name=name):
                 return self.builtin_lambda(name)
             case _:
                 return value

@@ -59,7 +59,7 @@ def slope(elaboration: Elaboration, form: str, node: nodes.Apply, function: Valu
 def _type_of(elaboration: Elaboration, value: Value) -> Type:
     """The type of a value, also of a local function, which is looked at with what its names stand for."""
     match value:
-        case Builtin(name):
+        case Builtin(name=name):
             return Function((Parameter(None, REAL),) * parameters_of(name), REAL)
         case Closure():
             written = _lambda_of(value)
