@@ -13,7 +13,8 @@ from potto.diagnostics import Diagnostic
 from potto.modules import chunk_start, module_diagnostics, names, open_files, source, statements
 from potto.modules.graph import dependencies, imported_files
 from potto.modules.lookup import bindings
-from potto.modules.texts import chunk_text, chunks, imports, is_diffeo, parsed, syntax_diagnostics
+from potto.modules.misread import syntax_diagnostics
+from potto.modules.texts import chunk_text, chunks, imports, is_diffeo, parsed
 from potto.projects.project import Project, Projects, read_project
 from potto.query import Database
 from potto.reports.render import Located

@@ -12,7 +12,8 @@ from potto.calculus.checking.diffeo import check_conditions
 from potto.diagnostics import Diagnostic, Related
 from potto.modules import chunk_start, module_diagnostics, statements
 from potto.modules.graph import Run, name_runs
-from potto.modules.texts import StatementRef, moved, syntax_diagnostics
+from potto.modules.misread import moved, syntax_diagnostics
+from potto.modules.texts import StatementRef
 from potto.query import Database, query
 from potto.quick import replace
 from potto.reports.render import Located

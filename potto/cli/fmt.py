@@ -56,7 +56,8 @@ def _format(
 ) -> tuple[list[Located], bool]:
     """Format one file as the options say; what is wrong with it, and whether it was (or would be) changed."""
     from potto.checking.check import errors_of
-    from potto.modules.texts import is_diffeo, syntax_diagnostics
+    from potto.modules.misread import syntax_diagnostics
+    from potto.modules.texts import is_diffeo
     from potto.reports.render import Located, display_name
     from potto.syntax import format_source
 

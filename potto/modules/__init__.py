@@ -26,6 +26,7 @@ from potto.modules.lookup import (
     resolve_member,
     resolve_module,
 )
+from potto.modules.misread import syntax_diagnostics
 from potto.modules.texts import (
     ChunkRef,
     Place,
@@ -41,7 +42,6 @@ from potto.modules.texts import (
     parsed,
     source,
     statements,
-    syntax_diagnostics,
 )
 
 __all__ = [

@@ -13,6 +13,7 @@ from potto.modules.builtins import is_builtin
 from potto.modules.import_checks import import_diagnostics, unreadable
 from potto.modules.kinds import DEFINED_TWICE, HIDES_BUILTIN, HIDES_IMPORT, UNREADABLE
 from potto.modules.lookup import bindings
+from potto.modules.misread import shift
 from potto.modules.texts import (
     Place,
     Unreadable,
@@ -22,7 +23,6 @@ from potto.modules.texts import (
     imports,
     names,
     places,
-    shift,
 )
 from potto.query import Database, query
 from potto.source import Span

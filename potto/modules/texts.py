@@ -14,7 +14,6 @@ from collections.abc import Mapping
 from itertools import accumulate
 from typing import Any, Literal
 
-from potto.diagnostics import Diagnostic
 from potto.modules.free import Reference, references_in
 from potto.modules.grouping import grouped
 from potto.query import Database, Parted, query
@@ -368,56 +367,6 @@ def import_starts(db: Database, file: str) -> tuple[int, ...]:
     """Where the chunks of `imports` start."""
     found = layout(db, file)
     return tuple([start + one.start for piece, start in zip(found.pieces, found.starts) for one in piece.imports])
-
-
-@query(travels=True)
-def syntax_diagnostics(db: Database, file: str) -> tuple[Diagnostic, ...]:
-    """What the parser has to say about a file, with absolute spans."""
-    diffeo, start, found = is_diffeo(file), 0, list[Diagnostic]()
-    for group in groups_of_pieces(db, file):
-        found += [shift(diagnostic, start) for diagnostic in _group_diagnostics(db, group, diffeo)]
-        start += sum(map(len, group))
-    return tuple(found)
-
-
-@query(keep=128)
-def _group_diagnostics(db: Database, group: tuple[str, ...], diffeo: bool) -> tuple[Diagnostic, ...]:
-    """What it has to say about a group of pieces, relative to the first one."""
-    start, found = 0, list[Diagnostic]()
-    for text in group:
-        found += [shift(diagnostic, start, None) for diagnostic in _piece_diagnostics(db, text, diffeo)]
-        start += len(text)
-    return tuple(found)
-
-
-@query(keep=512)
-def _piece_diagnostics(db: Database, text: str, diffeo: bool) -> tuple[Diagnostic, ...]:
-    """What it has to say about a piece, relative to it."""
-    return tuple(
-        [
-            shift(diagnostic, chunk.start, None)
-            for chunk in piece(db, text, diffeo).chunks
-            for diagnostic in parsed(db, chunk.text, diffeo).diagnostics
-        ]
-    )
-
-
-def moved(diagnostic: Diagnostic, start: int) -> Diagnostic:
-    """A diagnostic of a text that begins further on, with its suggestions; related places stay."""
-    suggestions = tuple(suggestion.shift(start) for suggestion in diagnostic.suggestions)
-    return replace(diagnostic, span=diagnostic.span.shift(start), suggestions=suggestions)
-
-
-def shift(diagnostic: Diagnostic, start: int, owner: str | None = "") -> Diagnostic:
-    """A diagnostic of a chunk with absolute spans; with no `owner`, of a piece, with spans relative to that. Related
-    places in other chunks are left to who knows them."""
-    related = tuple(
-        replace(place, span=place.span.shift(start), owner=owner)
-        if place.file is None and place.owner is None
-        else place
-        for place in diagnostic.related
-    )
-    return replace(moved(diagnostic, start), related=related)
 
 
 quick(Head, Place, Piece, Unreadable, StatementRef, Layout, Outline)

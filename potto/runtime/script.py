@@ -20,7 +20,7 @@ from potto.integrate.events import DIVERGENT, ROUGH, UNDEFINED
 from potto.kernels.cells import Rows, Value
 from potto.kernels.errors import wrong_call
 from potto.modules import statements
-from potto.modules.texts import moved
+from potto.modules.misread import moved
 from potto.projects.settings import Settings
 from potto.query import Database
 from potto.reports.render import Located, ProgramError

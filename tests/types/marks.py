@@ -15,7 +15,8 @@ import textwrap
 from dataclasses import dataclass
 
 from potto.diagnostics import Diagnostic
-from potto.modules.texts import StatementRef, chunk_start, names, statements, syntax_diagnostics
+from potto.modules.misread import syntax_diagnostics
+from potto.modules.texts import StatementRef, chunk_start, names, statements
 from potto.query import Database
 from potto.source import SourceText
 from potto.types import Typed, check_definition, check_statement, format_type, interface, typed_names

@@ -17,7 +17,7 @@ from potto.ide.model import ActionKind, Change, Edit
 from potto.ide.names.places import ChunkAt, all_chunks, chunk_at, owner, text_of
 from potto.modules import module_diagnostics, names, parsed
 from potto.modules.lookup import scope
-from potto.modules.texts import shift
+from potto.modules.misread import shift
 from potto.query import Database
 from potto.source import Span
 from potto.syntax import node_at, nodes, parse_chunk

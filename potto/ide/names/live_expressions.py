@@ -9,7 +9,8 @@ from collections.abc import Iterator
 
 from potto.diagnostics import Diagnostic
 from potto.ide.names.places import pieces_of
-from potto.modules.texts import groups_of_pieces, moved
+from potto.modules.misread import moved
+from potto.modules.texts import groups_of_pieces
 from potto.query import Database, query
 from potto.quick import replace
 from potto.syntax import live_expressions, parse_expression, split
