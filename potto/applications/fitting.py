@@ -54,19 +54,8 @@ def fit(
 
     Raises PottoError if the arguments do not fit the function or it has no value at the start.
     """
-    if method not in METHODS:
-        raise wrong_call(f"there is no method `{method}` to fit by", "the methods are " + ", ".join(METHODS))
-    if method == "gauss-newton" and target is None:
-        raise wrong_call("Gauss-Newton makes squared distances small, and no target is given", "give a target")
-    given = dict(given or {})
-    names = tuple(start)
-    if not names:
-        raise wrong_call("no parameter is named to fit")
-    for name in bounds or {}:
-        if name not in names:
-            near = difflib.get_close_matches(name, names, 1)
-            hint = f"did you mean `{near[0]}`?" if near else ""
-            raise wrong_call(f"a bound is given for `{name}`, which is not fitted", hint)
+    given, names = dict(given or {}), tuple(start)
+    _must_be_known(names, bounds or {}, method, target)
     gradient = grad(function, names)
     begun = _starts(start)
 
@@ -85,6 +74,21 @@ def fit(
         numbers, progress = kept(checkpoint, numbers), keeping(checkpoint, tuple(numbers), progress)
     found = minimized(objective, numbers, limits, steps, progress, method)
     return replace(found, parameters=_named(begun, np.array(list(found.numbers.values()))))
+
+
+def _must_be_known(names: tuple[str, ...], bounds: Mapping[str, Any], method: str, target: Any) -> None:
+    """Raise PottoError where a fit is asked for that there is not."""
+    if method not in METHODS:
+        raise wrong_call(f"there is no method `{method}` to fit by", "the methods are " + ", ".join(METHODS))
+    if method == "gauss-newton" and target is None:
+        raise wrong_call("Gauss-Newton makes squared distances small, and no target is given", "give a target")
+    if not names:
+        raise wrong_call("no parameter is named to fit")
+    for name in bounds:
+        if name not in names:
+            near = difflib.get_close_matches(name, names, 1)
+            hint = f"did you mean `{near[0]}`?" if near else ""
+            raise wrong_call(f"a bound is given for `{name}`, which is not fitted", hint)
 
 
 def numbers_of(start: Mapping[str, Any]) -> dict[str, float]:

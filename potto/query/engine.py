@@ -6,7 +6,6 @@ the database while the old one waits. So a chain of any length fits on the stack
 
 from __future__ import annotations
 
-import contextvars
 import os
 import sys
 import threading
@@ -32,6 +31,7 @@ from potto.query.nodes import (
     has_returned,
     short,
 )
+from potto.query.stacks import on_fresh_stack
 
 STEPS: Final = 10
 FEW: Final = 16
@@ -361,30 +361,16 @@ class Engine:
 
     def _on_fresh_stack(self, function: Callable[..., Any], args: tuple[Hashable, ...]) -> Any:
         """Call a function on a new thread, which owns the database while this one waits."""
-        answer: list[tuple[Any, BaseException | None]] = []
-        owner, context = self._owner, contextvars.copy_context()
+        owner = self._owner
 
-        def work() -> None:
+        def work() -> Any:
             self._owner = get_ident()
-            try:
-                answer.append((context.run(function, self, *args), None))
-            except BaseException as error:
-                answer.append((None, error))
+            return function(self, *args)
 
-        thread = threading.Thread(target=work, name="potto-query", daemon=True)
-        thread.start()
         try:
-            thread.join()
-        except BaseException:  # interrupted while waiting: the other thread must be out of the database first
-            self.cancel()
-            thread.join()
-            raise
+            return on_fresh_stack(work, self.cancel)
         finally:
             self._owner = owner
-        value, error = answer[0]
-        if error is not None:
-            raise error
-        return value
 
     # Cycles
 

@@ -17,6 +17,7 @@ from potto.calculus.differentiation.boundary_terms import at_bounds, at_surfaces
 from potto.calculus.differentiation.deltas import without_deltas, without_leftovers
 from potto.calculus.differentiation.derivative import NotSmooth, partial, total, zero_like
 from potto.calculus.differentiation.level_sets import level_set, steep, transported
+from potto.calculus.differentiation.stand_ins import as_values
 from potto.calculus.inlining.choices import calls_of_items, jumps_as_function
 from potto.calculus.inlining.expand import Resolve, expanded, heads_of, known_function
 from potto.calculus.surfaces.case_split import resolved
@@ -119,40 +120,11 @@ class Differentiator:
     def dual(self, term: Term, tangents: Mapping[str, Term]) -> Dual:
         functions = {n: t for n, t in tangents.items() if n in heads_of(term)}
         value, tangent = _Pass(self, tangents).run(term)
-        return self.as_values(value, functions), self.as_values(tangent, functions)
+        return as_values(value, functions, self.pair), as_values(tangent, functions, self.pair)
 
     def function(self, function: Lam) -> Lam:
         """Over duals, group by group."""
         return _Pass(self, {}).closed(function)
-
-    def as_values(self, term: Term, functions: Mapping[str, Term]) -> Term:
-        """Calls of functions of which only the dual is at hand, as the value of the dual's answer."""
-        if not functions or not term.free & functions.keys():
-            return term
-        inner = {n.function for n in postorder(term) if isinstance(n, App)}
-        memo: dict[Term, Term] = {}
-        for node in postorder(term):
-            if isinstance(node, App) and node not in inner:
-                head, groups = spine(node)
-                used = [a for group in groups for a in group if isinstance(a, Var) and a.name in functions]
-                if used or (isinstance(head, Var) and head.name in functions):
-                    memo[node] = self.answer(head, groups, functions, memo)
-                    continue
-            memo[node] = rebuild(node, tuple(memo[c] for c in children(node)))
-        return memo[term]
-
-    def answer(
-        self, head: Term, groups: tuple[tuple[Term, ...], ...], functions: Mapping[str, Term], memo: Mapping[Term, Term]
-    ) -> Term:
-        def over(term: Term) -> Term:
-            if isinstance(term, Var) and term.name in functions:
-                return functions[term.name]
-            return deriv(term) if isinstance(term, Global | Deriv | Lam) else self.pair(memo[term], ZERO)
-
-        result = over(head)
-        for group in groups:
-            result = app(result, tuple(over(a) for a in group))
-        return proj(result, 0)
 
     def with_deltas(self, body: Term, tangent: Term, tangents: Mapping[str, Term]) -> Term:
         """The tangent of an integrand: where a surface moves, its jump as a delta."""
@@ -323,7 +295,7 @@ class _Pass:
         values: dict[str, Term] = {}
         functions: dict[str, Term] = {}
         params = tuple(self.parameter(p, p in heads, taken, values, tangents, functions) for p in function.params)
-        result = self.owner.as_values(_Pass(self.owner, tangents).body_of(function), functions)
+        result = as_values(_Pass(self.owner, tangents).body_of(function), functions, self.owner.pair)
         opened = substitute(result, values)
         stand_ins = {next(iter(t.free)): outside[n] for n, t in tangents.items() if n in outside}
         made = lam(params, substitute(opened, stand_ins))

@@ -109,6 +109,7 @@ class Oracle:
         self.forced: int | None = None  # the delta that counts as 1; others count as 0
 
     def run(self, term: Term, env: Environment) -> Value:
+        """The value of a term: one match over all kinds there are, which is as long as their list."""
         match term:
             case Const(name=str(name)) if name in _NAMED:
                 return _NAMED[name]()

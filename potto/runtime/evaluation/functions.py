@@ -156,6 +156,17 @@ def choices(value: Value) -> Iterator[Chosen]:
             yield from choices(inner)
 
 
+def carries_errors(value: Value) -> bool:
+    """Whether a number in it is not exact."""
+    if isinstance(value, Cell):
+        return value.e is not None
+    if isinstance(value, tuple | list):
+        return any(map(carries_errors, value))
+    if isinstance(value, Rows):
+        return carries_errors(value.item)
+    return isinstance(value, Closure) and value.inexact
+
+
 def _moves(value: Value, direction: int) -> bool:
     if isinstance(value, Cell):
         return direction < len(value.t) and value.t[direction] is not None

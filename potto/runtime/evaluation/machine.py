@@ -39,7 +39,7 @@ from potto.integrate.costs import Costs
 from potto.integrate.events import MEETINGS, Event, Events, Members
 from potto.integrate.pieces import STRAY
 from potto.kernels import errors
-from potto.kernels.cells import Cell, Ints, Number, Pattern, Rows, Trace, Value, pad, pattern
+from potto.kernels.cells import Cell, Ints, Number, Pattern, Trace, Value, pad, pattern
 from potto.kernels.chunks import at_points, many
 from potto.kernels.compile import kernel
 from potto.kernels.making import counts
@@ -47,16 +47,14 @@ from potto.kernels.native.objects import available
 from potto.kernels.written import Kernel
 from potto.projects.settings import Settings
 from potto.runtime.evaluation.arguments import fit, uncurried
-from potto.runtime.evaluation.functions import Chosen, Closure, Derivative, Paired
+from potto.runtime.evaluation.functions import Chosen, Closure, Derivative, Paired, carries_errors
 from potto.runtime.evaluation.linker import Linker
 from potto.runtime.evaluation.record import Record
 
 DEEPEST_CALLS = 3000
-MOST_TERMS = 10_000_000
 OVERDRAFT = 3
 # The same where the roots of a condition are searched for: 2,000 asked are some 100,000 cells, half a second or two.
 GIVEN_UP = 64
-
 
 Groups = tuple[tuple[Value, ...], ...]
 WATCHING: ContextVar[Callable[[Lam, list[Value]], None] | None] = ContextVar("WATCHING", default=None)
@@ -151,15 +149,11 @@ class Machine:
 
     def inside(self) -> Machine:
         """The machine for an integrand: rounding is estimated by the integrator, not kept track of."""
-        if not (self.rounding or self.root):
-            return self
-        return self.changed(rounding=False, root=False)
+        return self.changed(rounding=False, root=False) if self.rounding or self.root else self
 
     def tracking(self) -> Machine:
         """The machine with rounding errors kept track of."""
-        if self.rounding:
-            return self
-        return self.changed(rounding=True)
+        return self if self.rounding else self.changed(rounding=True)
 
     def standing(self) -> Machine:
         """The machine for which surfaces, bounds and deltas stand still."""
@@ -278,7 +272,7 @@ class Machine:
         return pad(self.linker.constants[key], self.directions)
 
     def closure(self, function: Lam, captured: dict[str, Value]) -> Value:
-        return Closure(function, captured, self.linker.inexact(function) or _any_inexact(captured))
+        return Closure(function, captured, self.linker.inexact(function) or any(map(carries_errors, captured.values())))
 
     def derived(self, function: Value) -> Value:
         if not isinstance(function, Closure):
@@ -398,19 +392,6 @@ class Machine:
 
     def integral(self, term: Integral, env: dict[str, Value]) -> Value:
         return self.semantics.integral(self, term, env)
-
-
-def _any_inexact(values: dict[str, Value]) -> bool:
-    def inexact(value: Value) -> bool:
-        if isinstance(value, Cell):
-            return value.e is not None
-        if isinstance(value, (tuple, list)):
-            return any(map(inexact, value))
-        if isinstance(value, Rows):
-            return inexact(value.item)
-        return isinstance(value, Closure) and value.inexact
-
-    return any(map(inexact, values.values()))
 
 
 __all__ = ["Linker", "Machine", "Record"]
