@@ -93,7 +93,7 @@ def integrated(work: PanelBatch) -> Sums:
 
 def beside_short_ones(work: PanelBatch, p: Pieces) -> Pieces:
     """Whole segments, of which those are halved and graded that have missed something next to an end, of which their
-    own errors say too little: what these tell is refined as anything else is."""
+    own errors say too little: what these tell is refined as anything else is. Of the others it is part of the error."""
     missed = unseen(work, p)
     if missed is None:
         return p
@@ -102,6 +102,7 @@ def beside_short_ones(work: PanelBatch, p: Pieces) -> Pieces:
     known = TOO_LITTLE * np.maximum(p.error, p.floor)
     least = np.maximum(known, COUNTS * np.maximum(work.machine.atol, work.machine.rtol * total))
     left, right = ((part > least).any(axis=0) for part in missed)
+    p.error = p.error + np.where(left | right, 0.0, missed[0] + missed[1])
     if not (there := left | right).any():
         return p
     halves = halved(p.pick(there))
