@@ -4,6 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.stamp
 VSCODE := editors/vscode
+EXTRAS ?= dev
 
 TORCH ?= torch==2.13.0
 TESTS := $(BIN)/python -m pytest -n auto --maxprocesses 8 --dist worksteal --durations 20
@@ -76,7 +77,7 @@ clean:  ## start over
 $(STAMP): pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "Potto needs Python 3.11 or newer; try make PYTHON=python3.11"; exit 1; }
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install -qq --disable-pip-version-check -e '.[dev]'
+	$(BIN)/python -m pip install -qq --disable-pip-version-check -e '.[$(EXTRAS)]'
 	$(BIN)/python -m compileall -q potto lsp/potto_lsp repl/potto_repl  # as pip does with all but what stays where it is
 	touch $(STAMP)
 

@@ -162,12 +162,12 @@ def pictures(folder: Path, quick: bool) -> list[dict[str, Any]]:
     """For the gallery: the target, and what becomes of a mesh with each kind of colour."""
     photo = target()
     if quick:
-        photo = photo.reshape(8, 6, 8, 6, 3).mean(axis=(1, 3))
+        photo = photo.reshape(4, 12, 4, 12, 3).mean(axis=(1, 3))
     begin = np.rint(255 * photo).astype(np.uint8)
     Image.fromarray(begin).resize((384, 384), Image.Resampling.NEAREST).save(folder / "stylize-target.png")
     shown: list[dict[str, Any]] = [{"file": "stylize-target.png", "caption": "the target", "seconds": 0.0}]
     for kind in TERMS:
-        mesh = fitted(kind, photo, 2 if quick else 7, 2 if quick else 60)
+        mesh = fitted(kind, photo, 2 if quick else 7, 1 if quick else 60)
         file = f"stylize-{kind}.png"
         Image.fromarray(drawn(mesh, 32 if quick else 384)).save(folder / file)
         caption = f"{len(mesh.faces)} triangles of {kind} colour: loss {mesh.losses[0]:.4f} to {mesh.losses[-1]:.4f}"
