@@ -240,12 +240,9 @@ def _integral(
             else:
                 deltas.append(words.text(item.contribution, *names, box=box))
         deltas += [words.text(t, *names, box=box) for t in moving_deltas(node, rate)]
-        whole = opened(node)
-        assert isinstance(whole, Integral)
-        plain = without_deltas(whole, True)
-        if isinstance(plain, Integral):
-            reason = _why_searched(plain)
-        if isinstance(plain, Integral) and level_set(plain) is None:
+        plain = _without_deltas(node)
+        reason = "" if plain is None else _why_searched(plain)
+        if plain is not None and level_set(plain) is None:
             bounds = [words.text(t, *indices) for t in at_bounds(plain, rate)]
             swept = at_surfaces(plain, frozenset(inside), rate, True)
             boundary = [words.text(t, *indices) for t in swept if not (isinstance(t, Integral) and level_set(t))]
@@ -267,6 +264,14 @@ def _integral(
         tuple(meeting),
         ", ".join(f"{name} in {words.plain(lo)}..{words.plain(hi)}" for name, lo, hi in around),
     )
+
+
+def _without_deltas(node: Integral) -> Integral | None:
+    """The integral with its deltas integrated out, if it is still one then."""
+    whole = opened(node)
+    assert isinstance(whole, Integral)
+    plain = without_deltas(whole, True)
+    return plain if isinstance(plain, Integral) else None
 
 
 def _outside(surface: Term, box: Mapping[str, tuple[float, float]]) -> bool:

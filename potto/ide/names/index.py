@@ -194,6 +194,17 @@ class _Walk:
                 return self._block(node.bindings, (node.body,), node.span.end, "local")
             case nodes.Binding():
                 return (node.value,)
+            case nodes.NamedType(span=span, name=name) if "." not in name:
+                self.use(span, name)
+            case nodes.RealType():
+                self._real_type(node)
+            case _:
+                return self._item(node)
+        return ()
+
+    def _item(self, node: Any) -> Sequence[Any]:
+        """The steps of what stands in a file by itself."""
+        match node:
             case nodes.Definition():
                 self.add(node.name_span, node.name, "define")
                 return self._definition(node)
@@ -203,8 +214,6 @@ class _Walk:
             case nodes.RecordDefinition():
                 self.add(node.name_span, node.name, "define")
                 return self._scoped(self._groups((node.fields,), node.span), self._annotations((node.fields,)))
-            case nodes.NamedType(span=span, name=name) if "." not in name:
-                self.use(span, name)
             case nodes.Inverse():
                 return self._scoped(self._groups((node.parameters,), node.span), node.components)
             case nodes.For():
@@ -212,11 +221,9 @@ class _Walk:
                 return (node.iterable, *self._scoped((number,), self._statements(node)))
             case nodes.FromImport() | nodes.Import():
                 self._import(node)
-            case nodes.RealType():
-                self._real_type(node)
+                return ()
             case _:
                 return children(node)
-        return ()
 
     def _member(self, node: nodes.Member) -> None:
         """`u.a.b`, parts of a local name; else a name in a module, or what only who knows files can tell apart."""
