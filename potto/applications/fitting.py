@@ -8,9 +8,7 @@ from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import reduce
-from operator import getitem
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -25,8 +23,8 @@ from potto.python.gradients import grad
 from potto.runtime.answers.estimate import Estimate
 from potto.types.types import TupleOf, Type
 
-Path = tuple[str, ...]
-"""The name of a parameter and, where that is a record, those of fields."""
+Path = tuple[str | int, ...]
+"""The name of a parameter and, where that is a record, those of fields; of an array of records, which one."""
 
 
 def fit(
@@ -43,7 +41,7 @@ def fit(
     checkpoint: str | None = None,
 ) -> Fit:
     """Make a function least over the parameters named in `start`, from there on: numbers, arrays, or records as
-    dicts.
+    dicts, arrays of records as lists of these.
 
     given: the other parameters; arrays among them make the function an array. bounds: the least and the most that a
     parameter, or each element of one, may be; None where there is no limit. A start beyond them is moved there.
@@ -65,7 +63,7 @@ def fit(
             watch(answer)
         return _seen(answer, names, {path: np.ndim(value) for path, value in begun.items()}, target)
 
-    sides = {name: _sides(name, (bounds or {}).get(name)) for name in names}
+    sides: dict[str | int, tuple[float, float]] = {name: _sides(name, (bounds or {}).get(name)) for name in names}
     limits = [sides[path[0]] for path, value in begun.items() for _ in _labels(value)]
     numbers = numbers_of(start)
     if not numbers:
@@ -94,7 +92,7 @@ def _must_be_known(names: tuple[str, ...], bounds: Mapping[str, Any], method: st
 def numbers_of(start: Mapping[str, Any]) -> dict[str, float]:
     """The numbers that parameters are made of, by name, such as `ws[0]` and `camera.focal`."""
     return {
-        f"{'.'.join(path)}{label}": float(number)
+        f"{_written(path)}{label}": float(number)
         for path, value in _starts(start).items()
         for label, number in zip(_labels(value), np.ravel(value), strict=True)
     }
@@ -108,16 +106,24 @@ def by_fields(value: Any, type: Type) -> Any:
 
 
 def _starts(start: Mapping[str, Any]) -> dict[Path, Any]:
-    return {path: _begun(".".join(path), value) for path, value in _leaves(start)}
+    return {path: _begun(_written(path), value) for path, value in _leaves(start)}
 
 
-def _leaves(start: Mapping[str, Any], path: Path = ()) -> Iterator[tuple[Path, Any]]:
-    """What parameters start at, with the names that lead there: of a record, field by field."""
-    for name, value in start.items():
-        if isinstance(value, Mapping):
-            yield from _leaves(value, (*path, name))
-        else:
-            yield (*path, name), value
+def _written(path: Path) -> str:
+    return "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path).removeprefix(".")
+
+
+def _leaves(start: Any, path: Path = ()) -> Iterator[tuple[Path, Any]]:
+    """What parameters start at, with the way there: of a record field by field, of an array of these one by one."""
+    parts: Iterable[tuple[str | int, Any]] = ()
+    if isinstance(start, Mapping):
+        parts = start.items()
+    elif isinstance(start, list) and any(isinstance(item, Mapping) for item in start):
+        parts = enumerate(start)
+    else:
+        yield path, start
+    for part, value in parts:
+        yield from _leaves(value, (*path, part))
 
 
 def _begun(name: str, value: Any) -> Any:
@@ -148,15 +154,23 @@ def _labels(value: Any) -> list[str]:
 
 def _named(begun: Mapping[Path, Any], x: Array) -> dict[str, Any]:
     """Numbers in a row as parameters, in the form in which they began."""
-    found: dict[str, Any] = {}
+    found: dict[Any, Any] = {}
     at = 0
     for path, value in begun.items():
         size, inner = np.size(value), found
-        for name in path[:-1]:
-            inner = inner.setdefault(name, {})
+        for part in path[:-1]:
+            inner = inner.setdefault(part, {})
         inner[path[-1]] = x[at : at + size].reshape(np.shape(value)) if np.ndim(value) else float(x[at])
         at += size
-    return found
+    return {name: _in_lists(value) for name, value in found.items()}
+
+
+def _in_lists(value: Any) -> Any:
+    """What is known by places as a list."""
+    if not isinstance(value, dict):
+        return value
+    parts = {part: _in_lists(inner) for part, inner in value.items()}
+    return [parts[place] for place in range(len(parts))] if 0 in parts else parts
 
 
 def _seen(found: Any, names: Sequence[str], axes: Mapping[Path, int], target: Any) -> Seen:
@@ -167,7 +181,7 @@ def _seen(found: Any, names: Sequence[str], axes: Mapping[Path, int], target: An
 
     def rows(side: Any) -> list[Array]:
         whole = dict(zip(names, side if len(names) > 1 else (side,), strict=True))
-        return [_by_numbers(reduce(getitem, path, whole), found, count) for path, count in axes.items()]
+        return [_by_numbers(_at(whole, path), found, count) for path, count in axes.items()]
 
     sides = (rows(side) for side in (found.tangent, found.tangent_error))
     value, bound = _flat(found.value), _flat(found.error)
@@ -188,6 +202,13 @@ def _seen(found: Any, names: Sequence[str], axes: Mapping[Path, int], target: An
     slopes = 2 * np.mean(off * tangents, axis=1)
     slope_errors = 2 * np.mean(np.abs(off) * errors, axis=1)
     return Seen(float(np.mean(off**2)), slopes, float(np.max(slope_errors, initial=0.0)), value_error, off, tangents.T)
+
+
+def _at(whole: Any, path: Path) -> Any:
+    """What stands at the end of a way."""
+    for part in path:
+        whole = whole[part]
+    return whole
 
 
 def _by_numbers(slopes: Any, found: Any, axes: int) -> Array:

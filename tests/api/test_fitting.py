@@ -105,3 +105,12 @@ def test_mistakes_are_told(m, arguments, said):
         potto.fit(function, **arguments)
     diagnostic = caught.value.diagnostics[0]
     assert said in f"{diagnostic.message} {diagnostic.help}"
+
+
+def test_an_array_of_records_starts_as_a_list_of_dicts() -> None:
+    """(a - 1)^2 + (b + 2)^2 for each, so that the least place is known; within the tolerance of a fit's slopes."""
+    module = potto.compile("record P(a: Real, b: Real)\ndef f(ps: [n] P) sum p in ps ((p.a - 1)^2 + (p.b + 2)^2)")
+    found = potto.fit(module.f, {"ps": [{"a": 0.0, "b": 0.0}, {"a": 3.0, "b": 1.0}]})
+    assert list(found.numbers) == ["ps[0].a", "ps[0].b", "ps[1].a", "ps[1].b"]
+    assert [p["a"] for p in found.parameters["ps"]] == pytest.approx([1, 1], abs=1e-6)
+    assert module.f(found.parameters["ps"]).value < 1e-10

@@ -173,3 +173,12 @@ df = deriv(f)
         facts = derivative_facts(library.db, file, name)
         assert facts is not None and facts.surfaces == ("c.f.1 - c.focal*x = 0",)
         assert "dc.focal" in facts.derivative and "known.focal" in facts.derivative and "c.1" not in str(facts)
+
+
+def test_the_state_of_a_fold_has_the_fields_of_the_first_one() -> None:
+    library = Library()
+    record = "record S(at: Real, speed: Real)\nfirst = S(1, 0)\n"
+    text = record + "def f(k) (fold s = first for i in 1..4 (S(s.at + s.speed/4, s.speed - k*s.at))).at\n"
+    facts = derivative_facts(library.db, library.put("<text>", text), "f")
+    assert facts is not None and facts.body is not None
+    assert "s.speed" in facts.body.value and facts.body.value.endswith(".at") and "s.0.0" not in str(facts)

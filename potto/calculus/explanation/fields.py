@@ -13,6 +13,7 @@ from potto.core.terms import (
     ZERO,
     App,
     Deriv,
+    Fold,
     Global,
     Index,
     Proj,
@@ -29,7 +30,7 @@ from potto.core.terms import (
 )
 from potto.query import Database
 from potto.types import Type, groups_of, interface
-from potto.types.types import ArrayOf, Function, TupleOf, resolve, result_of
+from potto.types.types import UNKNOWN, ArrayOf, Function, TupleOf, resolve, result_of
 
 
 def fields_of(db: Database, type: Type | None) -> Callable[[Term], Term]:
@@ -48,6 +49,7 @@ def named_fields(db: Database, term: Term, parameters: Mapping[str, Type]) -> Te
     """The same with the fields of records as names: `camera.focal` is a variable of that name."""
     types: dict[Term, Type | None] = {}
     memo: dict[Term, Term] = {}
+    parameters = {**parameters, **_states(db, term, parameters)}
     for node in postorder(term):
         types[node] = found = _type(db, node, types, parameters)
         new = rebuild(node, tuple(memo[c] for c in children(node)))
@@ -57,6 +59,20 @@ def named_fields(db: Database, term: Term, parameters: Mapping[str, Type]) -> Te
                 new = var(f"{format_term(new.term)}.{whole.record.fields[node.index]}")
         memo[node] = _with_records(db, new) if isinstance(new, App) else new
     return memo[term]
+
+
+def _states(db: Database, term: Term, parameters: Mapping[str, Type]) -> dict[str, Type]:
+    """The types of the states of folds, which are those of the first ones."""
+    folds = [node for node in postorder(term) if isinstance(node, Fold)]
+    known: dict[str, Type] = {}
+    for fold in reversed(folds):  # what is outside first
+        types: dict[Term, Type | None] = {}
+        for node in postorder(fold.start):
+            types[node] = _type(db, node, types, {**parameters, **known})
+        found = types[fold.start]
+        if found is not None:
+            known[fold.state] = found
+    return known
 
 
 def _with_records(db: Database, call: App) -> Term:
@@ -101,6 +117,11 @@ def _type(db: Database, node: Term, types: Mapping[Term, Type | None], parameter
         case Proj(term=inner, index=place):
             whole = types[inner]
             found = whole.items[place] if isinstance(whole, TupleOf) and place < len(whole.items) else None
+        case Fold(start=start):
+            found = types[start]
+        case Tuple(items=items):
+            known = [types[item] for item in items]
+            found = TupleOf(tuple([UNKNOWN if one is None else one for one in known])) if any(known) else None
         case Index(array=inner):
             whole = types[inner]
             found = whole.item if isinstance(whole, ArrayOf) else None
