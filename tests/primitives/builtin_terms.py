@@ -8,6 +8,7 @@ import numpy as np
 
 from potto.core.terms import Branch, Const, If, Term, Var, postorder
 from potto.kernels.support import ARRAYS
+from potto.primitives.registry import Primitive
 
 EPS = 2.0**-52
 
@@ -36,3 +37,9 @@ def builtin(op: str, *args: float) -> float:
     """The numeric form of a builtin."""
     with np.errstate(all="ignore"):
         return float(ARRAYS.function(op)(*(np.float64(a) for a in args)))
+
+
+def nearest_order(primitive: Primitive, x: float) -> float:
+    """The nearest order that a builtin takes: whole ones, and halves where there are such."""
+    steps = 2 if primitive.name == "hurwitz" else 1
+    return round(steps * x) / steps

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import pytest
-from builtin_terms import EPS, builtin, double
+from builtin_terms import EPS, builtin, double, nearest_order
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from lint import lint
@@ -43,7 +43,7 @@ def numbers(lo: float, hi: float) -> st.SearchStrategy[float]:
 
 def points(primitive: Primitive) -> st.SearchStrategy[tuple[float, ...]]:
     return st.tuples(*(numbers(lo, hi) for lo, hi in domains(primitive))).map(
-        lambda point: (*(float(round(x)) for x in point[: primitive.orders]), *point[primitive.orders :])
+        lambda point: (*(nearest_order(primitive, x) for x in point[: primitive.orders]), *point[primitive.orders :])
     )
 
 

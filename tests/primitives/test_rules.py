@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from builtin_terms import EPS, builtin
+from builtin_terms import EPS, builtin, nearest_order
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from mpmath import mp
@@ -63,7 +63,7 @@ def ends(primitive: Primitive) -> st.SearchStrategy[list[tuple[float, float]]]:
         return st.builds(lambda a, w: (a, min(a + w, hi)), st.floats(lo, hi), width)
 
     def order(lo: float, hi: float) -> st.SearchStrategy[tuple[float, float]]:
-        return st.integers(math.ceil(lo), math.floor(hi)).map(lambda n: (float(n),) * 2)
+        return st.floats(lo, hi).map(lambda x: (nearest_order(primitive, x),) * 2)
 
     domain = primitive.domain * (2 if primitive.arity is None else 1)
     orders, others = domain[: primitive.orders], domain[primitive.orders :]
@@ -100,7 +100,7 @@ def test_intervals_enclose(primitive: Primitive, data: st.DataObject) -> None:
 @given(data=st.data())
 def test_discs_enclose(primitive: Primitive, data: st.DataObject) -> None:
     """What the linear part leaves is no more than the remainder, on the rim and inside, against mpmath."""
-    orders = [float(data.draw(st.integers(math.ceil(lo), math.floor(hi)))) for lo, hi in primitive.domain[:-1]]
+    orders = [nearest_order(primitive, data.draw(st.floats(lo, hi))) for lo, hi in primitive.domain[:-1]]
     lo, hi = primitive.domain[-1]
     if "inv" in primitive.name:  # the inverse of erf in the plane is searched for, from nearby
         lo, hi = lo + 0.3, hi - 0.3
