@@ -113,9 +113,9 @@ def test_error_estimates_are_shown_to_two_digits() -> None:
         (218.0, 1122.0, "0.2e3 ± 1.2e3", "0.2(12)e3"),
         (123456.0, 50.0, "123456 ± 50", "123456(50)"),
         (0.0, 1e-17, "0.0e-17 ± 1.0e-17", "0.0(10)e-17"),
-        (0.3, 4e-16, "0.3 ± 4.2e-16", "0.30000000000000000(42)"),  # the double is 1.1e-17 below 0.3
-        (1.0, 1e-300, "1 ± 1e-17", "1.00000000000000000(1)"),
-        (1e300, 3.1e290, "1e300 ± 3.2e290", None),
+        (0.3, 4e-16, "0.30000000000000000 ± 4.2e-16", "0.30000000000000000(42)"),  # the double is 1.1e-17 below 0.3
+        (1.0, 1e-300, "1.00000000000000000 ± 1e-17", "1.00000000000000000(1)"),
+        (1e300, 3.1e290, "1.00000000000e300 ± 3.2e290", None),
         (1e-300, 3.05e-305, "1.000000e-300 ± 3.1e-305", None),
         (5e-324, 5e-324, "5.0e-324 ± 5.1e-324", None),
         (1 / 3, 0.0, "0.3333333333333333", "0.3333333333333333"),
@@ -162,9 +162,7 @@ def test_errors_have_at_most_two_digits_and_values_no_fewer_places(pair: tuple[f
     value, bar = read(with_error(*pair))
     digits = str(bar.as_tuple().digits and int("".join(map(str, bar.as_tuple().digits))))
     assert len(digits) <= 2
-    last, place = value.as_tuple().exponent, bar.as_tuple().exponent
-    if last > place:  # type: ignore[operator]  # zeros that stand behind nearly all digits of a double
-        assert value == 0 or value.scaleb(-place).adjusted() >= 8  # type: ignore[operator]
+    assert value.as_tuple().exponent <= bar.as_tuple().exponent  # type: ignore[operator]
     assert read(concisely(*pair)) == (value, bar)  # both forms say the same
 
 

@@ -5,7 +5,7 @@ Knows nothing of terms, estimates or terminals, and does without numpy: arrays a
 
 Beside its error a value has the error's second digit, and the error is rounded up by what the value lost when it was
 rounded: so the interval that one reads contains the interval that was computed. Alone it has the last digit that the
-error leaves certain to one unit. Zeros at the end of nearly all digits of a double are left out either way.
+error leaves certain to one unit.
 """
 
 from __future__ import annotations
@@ -26,7 +26,6 @@ MISSED = "not converged: "  # stands in front of an answer that missed its toler
 MOST_ASKED, SPARE = 0.05, 5.0
 MOST_ITEMS = 12  # of an array that are shown
 DOUBLE = 18  # significant digits: one more than tell all doubles apart, so that rounding to them loses nothing
-CERTAIN = 9  # digits of a value from which on zeros at its end say nothing
 SMALLEST = -5  # the power of ten from which on numbers are written without an exponent
 SMALLEST_ERROR = -4  # the same of errors
 # Of a unit of the last digit: 0.027 is no double, and the one nearest to it is not to cost a unit of the error.
@@ -56,7 +55,9 @@ def format_number(value: float, error: float = 0.0) -> str:
     count = _rounded(value, place)
     if count == 0:
         return "0" if place <= -9 else _positional(0, min(place, 0))
-    return _padded(_written(count, place), count)
+    if len(str(abs(count))) < 9:
+        return _written(count, place)
+    return _shorten(_written(count, place))
 
 
 def format_digits(value: float, digits: int = 6) -> str:
@@ -102,10 +103,6 @@ class _Interval(Struct, frozen=True):
 
     @property
     def value(self) -> str:
-        return _padded(self.digits, self.count)
-
-    @property
-    def digits(self) -> str:
         return _positional(self.count, self.place) if self.plain else _scientific(self.count, self.place, self.scale)
 
     @property
@@ -116,7 +113,7 @@ class _Interval(Struct, frozen=True):
 
     @property
     def concise(self) -> str:
-        mantissa, mark, exponent = self.digits.partition("e")
+        mantissa, mark, exponent = self.value.partition("e")
         return f"{mantissa}({self.error}){mark}{exponent}"
 
 
@@ -167,11 +164,6 @@ def _positional(count: int, place: int) -> str:
     """`0.0270`; place is at most 0."""
     sign, digits = "-" if count < 0 else "", str(abs(count)).rjust(1 - place, "0")
     return f"{sign}{digits}" if place == 0 else f"{sign}{digits[:place]}.{digits[place:]}"
-
-
-def _padded(text: str, count: int) -> str:
-    """A number with the zeros at its end, or without them where nearly all digits of a double are known."""
-    return text if len(str(abs(count))) < CERTAIN else _shorten(text)
 
 
 def _scientific(count: int, place: int, scale: int) -> str:
