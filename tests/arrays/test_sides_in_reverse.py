@@ -103,3 +103,30 @@ def test_notes_on_second_derivatives_are_of_the_product_and_name_what_the_progra
     ones = np.ones(3)
     (note,) = potto.hessian(PROGRAM.moved)(ones).notes
     assert np.shape(note.backward) == (3, 3) and note.backward == pytest.approx(np.full((3, 3), 2 / 9), rel=1e-12)
+
+
+MESH = """
+def edge(ax, ay, bx, by, x, y) (bx - ax)*(y - ay) - (by - ay)*(x - ax)
+def covered(a: (Real, Real), b: (Real, Real), c: (Real, Real), grey)
+    integral ([0, 1/2], [0, 1/2]) [edge(a.0, a.1, b.0, b.1, x, y) >= 0 and edge(b.0, b.1, c.0, c.1, x, y) >= 0
+        and edge(c.0, c.1, a.0, a.1, x, y) >= 0]*grey^2 d(x, y)
+def mesh(p: [n] ((Real, Real), (Real, Real), (Real, Real)), grey: [n] Real)
+    sum i in 0..n - 1 (covered(p[i].0, p[i].1, p[i].2, grey[i]))
+"""
+
+
+def test_edges_on_those_of_a_pixel_are_looked_at_by_what_moves_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A triangle over half of a pixel, n times, each with its own seven numbers: each takes no more evaluations than
+    one by itself, by the numbers of others too; forward three times, as the whole is looked at from both sides."""
+    module = potto.compile(MESH)
+    triangle, counts = ((0.0, 0.0), (0.5, 0.0), (0.5, 0.5)), {}
+    for n in (1, 4):
+        found = potto.grad(module.mesh, ["p", "grey"])([triangle] * n, np.full(n, 0.5))
+        counts[n] = found.evals
+        assert found.value == pytest.approx(n / 32, abs=1e-15)  # half of a quarter, times a quarter: to rounding
+        assert np.asarray(found.tangent[1]) == pytest.approx(np.full(n, 0.125), abs=1e-15)
+    assert counts[4] <= 3 * 4 * counts[1]
+    monkeypatch.setattr(gradients, "MANY", 1)
+    monkeypatch.setattr(sided, "MOST", 0)
+    taped = potto.grad(module.mesh, ["p", "grey"])([triangle] * 4, np.full(4, 0.5)).evals
+    assert taped <= 4 * counts[1]

@@ -44,13 +44,13 @@ def locally(machine: Machine, env: Env, run: Run) -> Value:
 
 def _off_the_tape(machine: Machine, env: Env, moving: Sequence[Cell], run: Run) -> Value:
     """The same, as nodes of the tape: by the numbers of the environment, or by what they are made of where that is
-    less, or where what is met is to be told of the directions that were asked for."""
+    less, or where what is met is to be told of the directions that were asked for: once, where these are the same."""
     moving = [cell for cell in moving if isinstance(cell.t[0], Node)]  # others have a tangent that is 0
     nodes: list[Any] = [cell.t[0] for cell in moving]
     if not nodes:
         return pad(run(machine.with_directions(0), _with_tangents(env, {}, 0)), 1)
     few = leaves(nodes)
-    if few is None or len(few) >= len(nodes):
+    if few != frozenset(nodes) and (few is None or len(few) >= len(nodes)):
         found = _by_each(machine, env, moving, run)
         if found is not None:
             return map_cells(found, lambda cell: _taped(cell, nodes))
