@@ -75,9 +75,10 @@ class Answers:
     def _open(self, name: str) -> dict[str, Any]:
         """What there is to choose, and the text with its conditions."""
         found = self._scene(name)
-        wrt = self.wrt if self.wrt in found.values else found.moving
+        wrt = self.wrt if self.wrt in found.parameters else found.moving
         count = len(found.regions(wrt))
-        return {"values": found.values, "wrt": wrt, "integrals": count, **self._text(name)}
+        ranges = found.ranges(found.values)
+        return {"values": found.values, "wrt": wrt, "indices": ranges, "integrals": count, **self._text(name)}
 
     def _formulas(self, name: str) -> list[dict[str, str]]:
         found = derivative_text(self.world.db, self.file, name)

@@ -9,11 +9,12 @@ import math
 import time
 from collections.abc import Mapping
 
+import numpy as np
 from msgspec import Struct
 
 from potto.applications.integral_pictures import integral_svg, words
 from potto.applications.integral_views import FRAME, IntegralNumbers, IntegralView, Viewer, numbers
-from potto.checking.regions import Region, regions
+from potto.checking.regions import Region, indices, regions
 from potto.core.terms import ZERO, Lam, Term, app, lam, tuple_, var
 from potto.diagnostics import PottoError
 from potto.elaborate import core, elaborate_expression
@@ -47,7 +48,8 @@ class IntegralScene:
     """The integrals of one function. Raises PottoError if there is no such function, or it has no integral.
 
     given: texts for parameters; the others start as a live expression gives them. `values` has the numbers by name, a
-    tuple's as `p_1`, `p_2`, a record's as `p.field`.
+    tuple's as `p_1`, `p_2`, a record's as `p.field`, and those of indices of sums and arrays around integrals: what is
+    seen is one summand, the first if nobody says which. `parameters`: the names of those that can move.
     """
 
     def __init__(self, world: World, file: str, name: str, given: Mapping[str, str]) -> None:
@@ -60,10 +62,6 @@ class IntegralScene:
         if found is None:
             raise wrong_call(f"`{name}` is not a function of numbers", "name a function whose parameters are numbers, "
                              "tuples of them, or functions of them")  # fmt: skip
-        unknown = sorted(given.keys() - {parameter.name for parameter in found.parameters})
-        if unknown:
-            raise wrong_call(f"`{name}` has no parameter `{unknown[0]}`",
-                             f"its parameters are {', '.join(p.name for p in found.parameters)}")  # fmt: skip
         self.values: dict[str, float] = {}
         self._parts: dict[str, str] = {}  # what the program calls the numbers of a tuple or a record
         arguments = iter(self._arguments(found, given))
@@ -71,11 +69,21 @@ class IntegralScene:
         for group in groups_of(interface(world.db, target.file, target.name).type):
             call = app(call, tuple(next(arguments) for _ in group))
         self.term = lam(tuple(self.values), call)
+        self.parameters = tuple(self.values)
+        self._indices = indices(world.db, self.term)
+        names = [*(p.name for p in found.parameters), *(index.name for index in self._indices)]
+        unknown = sorted(given.keys() - set(names))
+        if unknown:
+            raise wrong_call(f"`{name}` has no parameter `{unknown[0]}`", f"its parameters are {', '.join(names)}")
         self._regions: dict[str, tuple[Region, ...]] = {}
         self._viewers: dict[tuple[str, int], Viewer] = {}
         self._took: dict[tuple[str, int], float] = {}  # seconds that numbers took last
         self._told: dict[tuple[str, int], float] = {}  # when that was
         self._functions: dict[Lam, TermFunction] = {}
+        for index in self._indices:
+            said = given.get(index.name)
+            self.values[index.name] = self._given(said, 1)[0] if said else -math.inf  # that is the first
+        self.values = self._on_indices(self.values)
 
     def _arguments(self, found: Scene, given: Mapping[str, str]) -> list[Term]:
         """What each parameter is given; `values` is filled on the way."""
@@ -125,26 +133,43 @@ class IntegralScene:
 
     def regions(self, wrt: str) -> tuple[Region, ...]:
         """The integrals of the function, with what moves as `wrt` does."""
-        if wrt not in self.values:
+        if wrt not in self.parameters:
             raise wrong_call(f"`{self.name}` has no number `{wrt}` to differentiate by",
-                             f"its numbers are {', '.join(self.values)}")  # fmt: skip
+                             f"its numbers are {', '.join(self.parameters)}")  # fmt: skip
         if wrt not in self._regions:
             found = regions(self.world.db, self.term, wrt)
             if not found:
                 raise wrong_call(f"`{self.name}` has no integral to look at", "name a function with an integral that "
-                                 "depends on nothing but its parameters")  # fmt: skip
+                                 "depends on nothing but its parameters and indices")  # fmt: skip
             self._regions[wrt] = found
         return self._regions[wrt]
 
     @property
     def moving(self) -> str:
         """The first number by which a surface or a bound moves, else the first one."""
-        for name in self.values:
+        for name in self.parameters:
             for region in self.regions(name):
                 rates = [*(surface.rate for surface in region.surfaces), *(r for pair in region.rates for r in pair)]
                 if any(rate.body is not ZERO for rate in rates):
                     return name
-        return next(iter(self.values))
+        return self.parameters[0]
+
+    def ranges(self, values: Mapping[str, float]) -> dict[str, tuple[float, float]]:
+        """The first and the last number of each index, with these values."""
+        found: dict[str, tuple[float, float]] = {}
+        for index in self._indices:
+            low, high = (float(self._compiled(end)(*(values[name] for name in end.params)).value)
+                         for end in (index.first, index.last))  # fmt: skip
+            found[index.name] = (low, high)
+        return found
+
+    def _on_indices(self, values: Mapping[str, float]) -> dict[str, float]:
+        """The same values, where indices stand on one of their numbers; on the first where there is none."""
+        found = dict(values)
+        for name in (index.name for index in self._indices):
+            low, high = self.ranges(found)[name]
+            found[name] = max(low, min(float(np.rint(max(found[name], low))), high))
+        return found
 
     def look(
         self, values: Mapping[str, float], wrt: str, which: int = 0, ghost: float | None = None, nodes: bool = False,
@@ -153,7 +178,7 @@ class IntegralScene:
         """The integral number `which`, from 0, with these values; `ghost`: the step of what is seen of differences,
         `nodes`: also where it was evaluated. A `quick` one is coarser, and mostly without numbers where these do not
         fit into a frame. Raises PottoError where it has no value."""
-        known = self.regions(wrt)
+        known, values = self.regions(wrt), self._on_indices(values)
         if not 0 <= which < len(known):
             raise wrong_call(f"`{self.name}` has {len(known)} integrals", f"choose one from 1 to {len(known)}")
         key = wrt, which

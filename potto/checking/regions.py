@@ -1,33 +1,34 @@
 """The integrals of a function as regions that can be drawn: bounds, integrand, and what its surfaces do.
 
-Owns `regions`. Everything is a term over the function's parameters and the variables of integration, so that numbers
-come from whoever evaluates programs. What a surface gains is its jump, from its negative to its
-positive side, times its rate: how fast its condition grows as the chosen parameter does.
+Owns `regions` and `indices`. Everything is a term over the function's parameters, indices and the variables of
+integration, so that numbers come from whoever evaluates programs. What a surface gains is its jump, from its negative
+to its positive side, times its rate: how fast its condition grows as the chosen parameter does.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 
 from msgspec import Struct
 
 from potto.calculus.differentiation.boundary_terms import jumps
 from potto.calculus.differentiation.dual import Differentiator
 from potto.calculus.explanation.explain import equation
-from potto.calculus.explanation.plain_names import plainly_named
+from potto.calculus.explanation.plain_names import apart, plainly_named
 from potto.checking.written_out import carried_out
 from potto.core.simplify import simplify
 from potto.core.terms import (
     ONE,
     ZERO,
     App,
+    Array,
     Branch,
     Delta,
     If,
     Integral,
     Lam,
     Proj,
+    Sum,
     Term,
     Tuple,
     branch,
@@ -36,7 +37,10 @@ from potto.core.terms import (
     lam,
     postorder,
     proj,
+    sub,
+    substitute,
     transform,
+    var,
     with_integrand,
 )
 from potto.elaborate import core
@@ -56,12 +60,20 @@ class RegionSurface(Struct, frozen=True):
     jump: Lam | None
 
 
+class Index(Struct, frozen=True):
+    """An index around an integral, and its first and last number, functions of the parameters and earlier indices."""
+
+    name: str
+    first: Lam
+    last: Lam
+
+
 class Region(Struct, frozen=True):
-    """An integral of a number: all terms are functions of `names`, the parameters and then the variables.
+    """An integral of a number: all terms are functions of `names`, the parameters and indices and then the variables.
 
     bounds, rates: of each variable from and to, and how fast these move. A bound may depend on the variables before it.
-    whole, interior: functions of the parameters alone, the integral and what it gains while surfaces and bounds stand
-    still. integrand: without deltas.
+    whole, interior: functions of parameters and indices alone, the integral and what it gains while surfaces and bounds
+    stand still. integrand: without deltas.
     """
 
     names: tuple[str, ...]
@@ -78,22 +90,26 @@ def regions(db: Database, term: Term, wrt: str) -> tuple[Region, ...]:
     """The outermost integrals of a function, in order; `wrt` is the parameter that moves. Of one that is a tuple there
     is a region for each number.
 
-    What depends on what is bound outside of it, as an integral in a sum, is left out. Raises PottoError where an
-    integrand has no derivative in symbols.
+    One in a sum or an array is a region for each choice of its `indices`. What depends on the state of a fold is left
+    out. Raises PottoError where an integrand has no derivative in symbols.
     """
-    params, whole = carried_out(db, term)
+    params, found, around = _outermost(db, term)
     work = Differentiator(lambda g: core(db, g.module, g.name).term, folding=True)
-    known = frozenset(params)
-    return tuple(
-        _region(part, tuple(params), work, wrt)
-        for node in _outermost(whole)
-        if node.free <= known
-        for part in _numbers(node)
-    )
+    names = (*params, *(index.name for index in around))
+    return tuple(_region(part, names, work, wrt) for node in found for part in _numbers(node))
 
 
-def _outermost(whole: Term) -> Iterator[Integral]:
-    """The integrals that are in no other one; where one number of a tuple is used, that of this number."""
+def indices(db: Database, term: Term) -> tuple[Index, ...]:
+    """The indices that the integrals of a function depend on, outer ones first."""
+    return _outermost(db, term)[2]
+
+
+def _outermost(db: Database, term: Term) -> tuple[tuple[str, ...], list[Integral], tuple[Index, ...]]:
+    """The parameters of a function, its integrals that are in no other one, and the indices that these depend on. Where
+    one number of a tuple is used, the integral is of this number. Indices with the same name and range are the same."""
+    params, whole = carried_out(db, term)
+    around: dict[tuple[str, Term, Term], str] = {}
+    found: dict[Integral, None] = {}
     stack, seen = [whole], set[Term]()
     while stack:
         node = stack.pop()
@@ -102,11 +118,27 @@ def _outermost(whole: Term) -> Iterator[Integral]:
         seen.add(node)
         of = node.term if isinstance(node, Proj) else node
         if isinstance(node, Proj) and isinstance(of, Integral):
-            yield with_integrand(of, _part(of.body, node.index))
+            found[with_integrand(of, _part(of.body, node.index))] = None
         elif isinstance(node, Integral):
-            yield node
+            found[node] = None
+        elif isinstance(node, Sum | Array):
+            low, high = (ZERO, sub(node.size, ONE)) if isinstance(node, Array) else (node.lo, node.hi)
+            written = node.variable.partition("'")[0]
+            name = around.setdefault((written, low, high), apart(written, {*params, *around.values()}))
+            stack += [substitute(node.body, {node.variable: var(name)}), high, low]
         else:
             stack.extend(reversed(children(node)))
+    known = {*params, *around.values()}
+    closed = [node for node in found if node.free <= known]
+    needed = set[str]().union(*(node.free for node in closed))
+    kept: list[Index] = []
+    for (_, low, high), name in reversed(around.items()):
+        if name in needed and low.free | high.free <= known:
+            needed |= low.free | high.free
+            before = (*params, *(n for n in around.values() if n in low.free | high.free))
+            kept.append(Index(name, lam(before, low), lam(before, high)))
+    names = {*params, *(index.name for index in kept)}
+    return tuple(params), [node for node in closed if node.free <= names], tuple(reversed(kept))
 
 
 def _numbers(node: Integral) -> list[Integral]:

@@ -228,3 +228,37 @@ def test_what_stands_beside_a_picture_does_not_lie_on_other_words() -> None:
             "{http://www.w3.org/2000/svg}text") if float(t.get("y", "nan")) < 50)  # fmt: skip
         assert len(above) == 3 and min(b - a for a, b in pairwise(above)) >= 12
     assert any("x² + y² = r²" in (text or "") for _, text in texts)
+
+
+INDEXED = r"""
+def many(t) sum i in 2..4 (integral [0, 1] [x < t/i]*(i + x) d(x))
+def nested(t) sum i in 2..3 (sum j in i..5 (integral [0, 1] [x < t/(i*j)] d(x)))
+def listed(t) sum j in 0..3 ([integral [0, 1] [x < t/(i + 1)] d(x) for i in 0..3][j])
+def pair(t) (sum i in 1..2 (integral [0, 1] [x < t/i] d(x))) + (sum i in 3..4 (integral [0, 1] [x < t/i] d(x)))
+"""
+
+
+@pytest.mark.parametrize(
+    ("name", "given", "which", "indices", "tangent"),
+    [  # the derivative of one summand by t, by hand
+        ("many", {}, 0, {"i": 2}, (2 + 0.3 / 2) / 2),
+        ("many", {"i": "3"}, 0, {"i": 3}, (3 + 0.3 / 3) / 3),
+        ("many", {"i": "99"}, 0, {"i": 4}, (4 + 0.3 / 4) / 4),
+        ("nested", {}, 0, {"i": 2, "j": 2}, 1 / 4),
+        ("nested", {"i": "3", "j": "2"}, 0, {"i": 3, "j": 3}, 1 / 9),
+        ("listed", {"i": "1"}, 0, {"i": 1}, 1 / 2),
+        ("pair", {}, 1, {"i": 1, "i_": 3}, 1 / 3),
+    ],
+)
+def test_of_an_integral_in_a_sum_one_summand_is_seen(
+    name: str, given: dict[str, str], which: int, indices: dict[str, float], tangent: float
+) -> None:
+    world = World()
+    scene = IntegralScene(world, world.put("program.po", INDEXED), name, {"t": "0.3", **given})
+    assert scene.values == {"t": 0.3, **indices}
+    assert scene.moving == "t"
+    numbers = scene.look(scene.values, "t", which).numbers
+    assert numbers is not None
+    assert numbers.tangent == pytest.approx(tangent, abs=1e-13)  # roundings of a product
+    with pytest.raises(PottoError, match="no number `i` to differentiate by"):
+        scene.regions("i")

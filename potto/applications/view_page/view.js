@@ -19,7 +19,7 @@ async function ask(path, body) {
   return new Promise((resolve) => waiting.set(id, resolve));
 }
 
-let state = { name: "", values: {}, wrt: "", which: 0, integrals: 1 };
+let state = { name: "", values: {}, indices: {}, wrt: "", which: 0, integrals: 1 };
 let lit = "";
 let last = null; // the newest answer
 let pinned = null;
@@ -161,10 +161,10 @@ async function open(name, keep = false, which = 0) {
   const same = keep && name === state.name && Object.keys(found.values).join() === Object.keys(state.values).join();
   state = {
     name, integrals: found.integrals, which: Math.min(same ? state.which : which, found.integrals - 1),
-    values: same ? state.values : found.values, wrt: same ? state.wrt : found.wrt,
+    values: same ? state.values : found.values, indices: found.indices, wrt: same ? state.wrt : found.wrt,
   };
   $("name").value = name;
-  fill($("wrt"), Object.keys(state.values).map((n) => [n, n]), state.wrt);
+  fill($("wrt"), Object.keys(state.values).filter((n) => !(n in state.indices)).map((n) => [n, n]), state.wrt);
   fill($("which"), Array.from({ length: found.integrals }, (_, n) => [n, `integral ${n + 1} of ${found.integrals}`]), state.which);
   $("which").hidden = found.integrals < 2;
   if (!same) sliders();
@@ -178,8 +178,9 @@ async function open(name, keep = false, which = 0) {
 
 function sliders() {
   $("sliders").replaceChildren(...Object.entries(state.values).map(([name, value]) => {
-    const reach = Math.max(1, Math.abs(value));
-    const slider = make("input", { type: "range", min: value - reach, max: value + reach, step: reach / 500, value, name });
+    const reach = Math.max(1, Math.abs(value)), index = state.indices[name];
+    const [min, max, step] = index ? [...index, 1] : [value - reach, value + reach, reach / 500];
+    const slider = make("input", { type: "range", min, max, step, value, name });
     const told = make("output", { textContent: String(+value.toPrecision(6)) });
     slider.dataset.parameter = name;
     slider.oninput = () => {

@@ -1,11 +1,11 @@
 """Integrals over variables that a program can write.
 
-Owns `plainly_named`.
+Owns `plainly_named` and `apart`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Container, Iterable
 
 from potto.core.terms import Integral, integral, substitute, var
 
@@ -17,11 +17,17 @@ def plainly_named(node: Integral, params: Iterable[str]) -> Integral:
     for name in node.variables:
         base = name.partition("'")[0]
         if base != name:
-            while base in taken:
-                base += "_"
+            base = apart(base, taken)
             taken.add(base)
         new[name] = base
     terms = {name: var(plain) for name, plain in new.items()}
     bounds = tuple((substitute(low, terms), substitute(high, terms)) for low, high in node.bounds)
     found = integral(tuple(new.values()), bounds, substitute(node.body, terms))
     return found if isinstance(found, Integral) else node
+
+
+def apart(name: str, taken: Container[str]) -> str:
+    """A name like this one that is not taken."""
+    while name in taken:
+        name += "_"
+    return name
