@@ -155,6 +155,33 @@ def pixel(px, py, r, t)
 """
 
 
+SHAPED = """from discs import disc
+def hill(x, y) x*(if [y < 0.25] then 1 else 2)
+def pixel(px, py, t, shape)
+    integral ([px, px + 0.1], [py, py + 0.1]) [shape(x, y) < t] d(x, y)
+"""
+
+
+def test_a_pixel_leads_to_the_conditions_of_the_function_that_it_is_given(server: Server, uri: Uri) -> None:
+    """Of y < 0.25 at (0.35, 0.3), the middle of a pixel of 0.1: 0.05 above it, half a pixel. 2*x < t: t - 0.7 = 0.1,
+    which is half of 2*0.1. The view begins with `hill`, whose condition is lit by its call."""
+    client = server()
+    client.open(uri("discs"), DISCS)
+    client.open(uri("main"), SHAPED)
+    values = {"px": 0.3, "py": 0.25, "t": 0.8, "shape": "hill"}
+    asked = {"textDocument": {"uri": uri("main")}, "name": "pixel", "values": values, "cell": {"px": 0.1, "py": 0.1}}
+    found = client.answer(client.begin("potto/pixel", asked), 60)["result"]["conditions"]
+    where = {tuple(each["range"]["start"].values()): each["pixels"] for each in found}
+    assert where == {(1, 22): pytest.approx(0.5), (3, 47): pytest.approx(0.5)}
+    asked["values"] = {**values, "shape": r"\(x, y) . x*disc(x, y, 0.4)"}
+    found = client.answer(client.begin("potto/pixel", asked), 60)["result"]["conditions"]
+    assert (found[0]["uri"], found[0]["range"]["start"]) == (uri("discs"), {"line": 0, "character": 19})
+    place = {"textDocument": {"uri": uri("main")}, "position": {"line": 3, "character": 51}}
+    seen = client.answer(client.begin("potto/viewed", place), 60)["result"]
+    assert seen["lit"] == "y = 0.25"
+    assert [each["equation"] for each in seen["conditions"]] == ["y = 0.25", "x*(if [y < 0.25] then 1 else 2) = t"]
+
+
 def test_a_pixel_leads_to_the_conditions_behind_it(server: Server, uri: Uri) -> None:
     """Of x^2 + y^2 < r^2 at (0.35, 0.4), the middle: 0.25 - 0.1225 - 0.16 = -0.0325 outside; over a pixel it changes by
     0.1*(2*0.35 + 2*0.4) = 0.15, so it is 0.2167 pixels off. Of x < t: t - 0.35 = 0.25, which is 2.5 pixels."""

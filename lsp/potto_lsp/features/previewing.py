@@ -67,7 +67,8 @@ def pixel(ask: Ask) -> Deferred:
         raise InvalidParams("`values` is an object, and `cell` the sides of a pixel by the names of its axes")
     if not cell or not all(_is_number(values.get(axis)) for axis in cell):
         raise InvalidParams("`values` has a number for each axis of `cell`")
-    found = pixel_conditions(ask.db, ask.file, name)
+    given = tuple((str(parameter), text) for parameter, text in values.items() if isinstance(text, str))
+    found = pixel_conditions(ask.db, ask.file, name, given)
     start = chunk_start(ask.db, ask.file, name)
     chunk = chunk_text(ask.db, ask.file, name) or ""
     whole = ask.range(Span(start, start + len(chunk.rstrip())))

@@ -165,13 +165,16 @@ def _outside_bodies(node: Term) -> Sequence[Term]:
     return parts_below(node)
 
 
-def conditions_of(term: Term, skeletons: Resolve, whole: Resolve) -> tuple[Condition, ...]:
-    """All conditions under the integrals of a term that vary with variables of integration; each once."""
+def conditions_of(
+    term: Term, skeletons: Resolve, whole: Resolve, given: Mapping[str, Term] = {}
+) -> tuple[Condition, ...]:
+    """All conditions under the integrals of a term that vary with variables of integration; each once. given: functions
+    that some of its parameters stand for."""
     walk = _Walk(skeletons, whole)
     body = term
     while isinstance(body, Lam):
         body = body.body
-    walk.term(body, _Place({}, {}, (), (), None))
+    walk.term(body, _Place({}, given, (), (), None))
     found = [walk.condition(node, place) for node, place in reversed(walk.met)]  # what is called is expanded first
     return tuple({(c.coordinates, c.anchor): c for c in reversed(found) if c is not None}.values())
 

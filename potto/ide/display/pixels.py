@@ -10,14 +10,13 @@ from collections.abc import Mapping
 
 from msgspec import Struct
 
-from potto.calculus.checking.conditions import Condition, conditions_of
-from potto.calculus.checking.diffeo import exported
+from potto.calculus.checking.conditions import Condition
 from potto.calculus.inlining.currying import parameters_of
 from potto.core.printer import format_term
 from potto.core.simplify import simplify
 from potto.core.terms import App, Branch, Delta, Integral, Term, add, const, mul, postorder, substitute
-from potto.elaborate import core, core_term
-from potto.ide.hover.derivatives import condition_infos, shown_equation, sound
+from potto.elaborate import core
+from potto.ide.hover.derivatives import Functions, condition_infos, conditions, shown_equation, sound
 from potto.query import Database, query
 from potto.source import Span
 
@@ -38,17 +37,16 @@ class PixelCondition(Struct, frozen=True):
 
 
 @query
-def pixel_conditions(db: Database, file: str, name: str) -> tuple[PixelCondition, ...]:
-    """The conditions of a definition that depend on its parameters only, in the order of the text."""
+def pixel_conditions(db: Database, file: str, name: str, given: Functions = ()) -> tuple[PixelCondition, ...]:
+    """The conditions of a definition, and of functions that it is given, that depend on its parameters only, in the
+    order of the text."""
     if not sound(db, file, name):
         return ()
     elaborated = core(db, file, name)
     spans, params, middles = dict(elaborated.origins), parameters_of(elaborated.term), _middles(elaborated.term)
-    shown = {(info.span, info.equation) for info in condition_infos(db, file, name) if not info.problem}
+    shown = {(info.span, info.equation) for info in condition_infos(db, file, name, given) if not info.problem}
     found: dict[PixelCondition, None] = {}
-    for condition in conditions_of(
-        elaborated.term, lambda g: exported(db, g.module, g.name), lambda g: core_term(db, g.module, g.name)
-    ):
+    for condition in conditions(db, file, name, given):
         span, equation = spans.get(condition.anchor), shown_equation(condition.surface)
         surface = _in_the_middle(condition.surface, middles)
         if span is None or (span, equation) not in shown or surface.free - set(params):

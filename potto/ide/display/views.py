@@ -9,6 +9,7 @@ from msgspec import Struct
 
 from potto.ide.display.scenes import scene
 from potto.ide.hover.derivatives import condition_infos
+from potto.ide.names.live_expressions import wrong_with
 from potto.ide.names.places import chunk_at, owner
 from potto.query import Database
 from potto.source import Span
@@ -38,9 +39,12 @@ def viewed(db: Database, file: str, offset: int) -> Viewed | None:
     """What there is to see at a place; None where it is in no function whose parameters are numbers."""
     chunk = chunk_at(db, file, offset)
     name = None if chunk is None else owner(db, chunk)
-    if chunk is None or name is None or scene(db, file, name) is None:
+    seen = None if chunk is None or name is None else scene(db, file, name)
+    if chunk is None or name is None or seen is None:
         return None
-    infos = [info for info in condition_infos(db, file, name) if not info.problem]
+    fitting = [(p.name, [text for text in p.fits if not wrong_with(db, file, text)]) for p in seen.parameters]
+    given = tuple((parameter, texts[0]) for parameter, texts in fitting if texts)  # as the picture begins with
+    infos = [info for info in condition_infos(db, file, name, given) if not info.problem]
     conditions = tuple(ViewedCondition(info.equation, chunk.absolute(info.span)) for info in infos)
     around = [c for c in conditions if c.span.start - 1 <= offset <= c.span.end + 1]  # with the brackets
     lit = min(around, key=lambda c: len(c.span)).equation if around else ""

@@ -10,7 +10,7 @@ from collections.abc import Iterable
 
 from msgspec import Struct
 
-from potto.calculus.checking.conditions import called_by, conditions_of
+from potto.calculus.checking.conditions import Condition, called_by, conditions_of
 from potto.calculus.checking.diffeo import DiffeoInfo, diffeo_info, exported
 from potto.calculus.checking.solvability import Problem, Verdict, judge
 from potto.calculus.explanation.explain import equation, explain_derivative
@@ -21,13 +21,14 @@ from potto.calculus.solving.inverse_map import Inverse, invert
 from potto.checking.check import has_errors
 from potto.core.printer import format_term
 from potto.core.simplify import simplify
-from potto.core.terms import Hole, Term, postorder
-from potto.elaborate import core, core_term
+from potto.core.terms import Deriv, Global, Hole, Lam, Term, postorder
+from potto.elaborate import core, core_term, elaborate_expression
+from potto.ide.names.live_expressions import wrong_with
 from potto.modules import definition, dependencies, is_recursive, references
 from potto.modules.graph import strongly_connected
 from potto.query import Database, query
 from potto.source import Span
-from potto.syntax import nodes
+from potto.syntax import nodes, parse_expression
 from potto.syntax.typesetting import broken
 from potto.types import check_definition, interface
 
@@ -79,19 +80,39 @@ class ConditionInfo(Struct, frozen=True):
     searched: bool = False
 
 
+Functions = tuple[tuple[str, str], ...]  # parameters that are functions, each with the text of what it is given
+
+
+def conditions(db: Database, file: str, name: str, given: Functions = ()) -> tuple[Condition, ...]:
+    """The conditions of a sound definition, those of functions that it is given as well. A text that is no function of
+    the file, or not a sound one, gives none."""
+    functions: dict[str, Term] = {}
+    for parameter, text in given:
+        if wrong_with(db, file, text):
+            continue
+        term = elaborate_expression(db, file, parse_expression(text).expr).term
+        names = [node for node in postorder(term) if isinstance(node, Global)]
+        if isinstance(term, Lam | Global | Deriv) and all(sound(db, g.module, g.name) for g in names):
+            functions[parameter] = term
+    return conditions_of(
+        core(db, file, name).term,
+        lambda g: exported(db, g.module, g.name),
+        lambda g: core_term(db, g.module, g.name),
+        functions,
+    )
+
+
 @query
-def condition_infos(db: Database, file: str, name: str) -> tuple[ConditionInfo, ...]:
-    """The conditions of a definition, in the order of the text; also those that calls lead to."""
+def condition_infos(db: Database, file: str, name: str, given: Functions = ()) -> tuple[ConditionInfo, ...]:
+    """The conditions of a definition, in the order of the text; also those that calls lead to. given: what parameters
+    that are functions stand for; without that, calls of these lead to none."""
     if not sound(db, file, name):
         return ()
     elaborated = core(db, file, name)
     spans = dict(elaborated.origins)
-    found = conditions_of(
-        elaborated.term, lambda g: exported(db, g.module, g.name), lambda g: core_term(db, g.module, g.name)
-    )
     parameters = parameters_of(elaborated.term)
     out: dict[ConditionInfo, None] = {}
-    for condition in found:
+    for condition in conditions(db, file, name, given):
         span = spans.get(condition.anchor)
         if span is None or any(isinstance(n, Hole) for c in condition.coordinates for n in postorder(c)):
             continue
