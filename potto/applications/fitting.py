@@ -21,7 +21,8 @@ from potto.kernels.errors import wrong_call
 from potto.python.functions import Function
 from potto.python.gradients import grad
 from potto.runtime.answers.estimate import Estimate
-from potto.types.types import TupleOf, Type
+from potto.runtime.answers.named import has_records
+from potto.types.types import ArrayOf, TupleOf, Type
 
 Path = tuple[str | int, ...]
 """The name of a parameter and, where that is a record, those of fields; of an array of records, which one."""
@@ -99,9 +100,13 @@ def numbers_of(start: Mapping[str, Any]) -> dict[str, float]:
 
 
 def by_fields(value: Any, type: Type) -> Any:
-    """A record, which is a tuple as a value, as a dict of its fields."""
-    if not isinstance(type, TupleOf) or type.record is None:
+    """Records, which are tuples as values, as dicts of their fields, also those in arrays and in tuples."""
+    if not has_records(type):
         return value
+    if isinstance(type, ArrayOf):
+        return [by_fields(item, type.item) for item in value]
+    if not isinstance(type, TupleOf) or type.record is None:
+        return tuple(map(by_fields, value, type.items)) if isinstance(type, TupleOf) else value
     return {name: by_fields(v, t) for name, v, t in zip(type.record.fields, value, type.items, strict=True)}
 
 

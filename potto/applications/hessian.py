@@ -61,7 +61,7 @@ def hessian(function: Function, wrt: Names = None) -> Callable[..., Estimate]:
         if isinstance(found.value[0], tuple):
             raise wrong_call("only a function that gives one number has a Hessian", "take one component of the answer")
         product = _product(found, given, names)
-        single = len(names) == 1 and not isinstance(given[names[0]], tuple | Rows)
+        single = len(names) == 1 and not isinstance(given[names[0]], tuple | list | Rows)
         sides = (product.tangent, product.tangent_error)
         value, error = (_as_matrix(list(_leaves(side, 1 + axes)), single) for side in sides)
         common = {name: getattr(product, name) for name in Estimate.__struct_fields__}
@@ -145,8 +145,8 @@ def _dual(argument: Any, direction: Any) -> Any:
 
 def _like(argument: Any, numbers: Iterator[Any] | None) -> Any:
     """These numbers, or zeros, in the form of an argument; those of an array element by element."""
-    if isinstance(argument, tuple):
-        return tuple(_like(item, numbers) for item in argument)
+    if isinstance(argument, tuple | list):
+        return type(argument)([_like(item, numbers) for item in argument])
     if isinstance(argument, Rows):
         if numbers is None:
             return map_cells(argument, lambda _: Cell(0.0))
@@ -169,14 +169,14 @@ def _filled(value: Value, block: Any, inner: int) -> Value:
 
 def _count(argument: Any) -> int:
     """How many numbers an argument has."""
-    if isinstance(argument, tuple):
+    if isinstance(argument, tuple | list):
         return sum(map(_count, argument))
     return argument.size * _count(argument.item) if isinstance(argument, Rows) else 1
 
 
 def _leaves(argument: Any, batch: int) -> Iterator[Any]:
     """The numbers of derivatives; of arrays, behind the axes of a batch, element by element."""
-    if isinstance(argument, tuple):
+    if isinstance(argument, tuple | list):
         for item in argument:
             yield from _leaves(item, batch)
     elif np.ndim(argument) > batch:
@@ -219,9 +219,11 @@ def _own_notes(found: Gradient, count: int) -> tuple[OneSided, ...]:
 
 def _last(slopes: Any, argument: Any) -> Any:
     """The second of each pair (that of f, that of f' v), in the form of a parameter."""
-    if isinstance(argument, tuple):
-        return tuple(_last(part, item) for part, item in zip(slopes, argument, strict=True))
-    return slopes[..., 1] if isinstance(argument, Rows) else slopes[1]  # of an array, pairs are the last axis
+    if isinstance(argument, Rows) or (isinstance(argument, list) and isinstance(slopes, np.ndarray)):
+        return slopes[..., 1]  # of an array, pairs are the last axis
+    if isinstance(argument, tuple | list):
+        return type(argument)([_last(part, item) for part, item in zip(slopes, argument, strict=True)])
+    return slopes[1]
 
 
 def _as_matrix(rows: list[Any], single: bool) -> Any:

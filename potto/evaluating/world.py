@@ -15,9 +15,10 @@ from typing import Any, TypeVar
 from msgspec import Struct
 from msgspec.structs import replace
 
+from potto.calculus.explanation.fields import named_fields, parameter_types
 from potto.checking.check import absolute, definition_diagnostics, has_errors
 from potto.checking.library import Library
-from potto.core.terms import Term, postorder
+from potto.core.terms import Proj, Term, postorder
 from potto.diagnostics import Diagnostic, PottoError, Related
 from potto.elaborate import core, elaborate_expression
 from potto.kernels.cells import Value
@@ -31,7 +32,7 @@ from potto.runtime.script import Script, Shown, placed, remarks
 from potto.source import SourceText, Span
 from potto.syntax import parse_expression
 from potto.syntax.nodes import Expr
-from potto.types import format_type, infer_expression
+from potto.types import format_type, infer_expression, interface
 from potto.types.kinds import NO_TANGENT
 from potto.types.types import Type
 
@@ -86,7 +87,7 @@ class World(Library):
         if getattr(self._local, "revision", None) != revision:
             self._local.revision = revision
             self._local.memory = {}
-            self._local.program = Program(self.lookup, self._held, self._place)
+            self._local.program = Program(self.lookup, self._held, self._place, self._with_fields)
 
     def _place(self, met: Sequence[object], definitions: Mapping[tuple[str, str], Term]) -> Related | None:
         """Where in a definition that which was met first was written: in the one whose function was met as well, or the
@@ -107,6 +108,22 @@ class World(Library):
         """The narrowest place of a text whose term, as it is evaluated, holds what was met."""
         ready = self.program.linker.ready
         return min((span for term, span in origins if met in postorder(ready(term))), key=len, default=None)
+
+    def _with_fields(self, term: Term, definitions: Mapping[tuple[str, str], Term]) -> Term:
+        """A term that evaluation met with the fields of records as names: as the definition knows them that holds it,
+        or all that have parameters of these names, where they agree."""
+        wanted = {name for node in postorder(term) if isinstance(node, Proj) for name in node.free}
+        if not any(isinstance(node, Proj) for node in postorder(term)):
+            return term  # as most are
+        found: dict[tuple[str, str], Term] = {}
+        with self.db.evaluating():
+            for file, name in definitions:
+                known = parameter_types(interface(self.db, file, name).type) if _owners.get(file, self) is self else {}
+                if known.keys() & wanted or not wanted:
+                    found[file, name] = named_fields(self.db, term, known)
+        inner = {named for key, named in found.items() if term in postorder(definitions[key])}
+        each = inner or set(found.values())
+        return each.pop() if len(each) == 1 else term
 
     def hold(self, file: str, name: str, value: Value) -> None:
         """Let a definition have this value, with its error, from now on: its term is not evaluated again."""

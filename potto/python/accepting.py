@@ -169,6 +169,8 @@ def as_given(argument: Any, part: Any, type: Type | None) -> Any:
 def _elements(argument: Any, part: Any, type: ArrayOf) -> Any:
     """Derivatives by an array of records in the form of dicts, or of the columns that it was given as."""
     record, axes = record_in(type), axes_of(type)
+    if isinstance(argument, list) and isinstance(resolve(type.item), ArrayOf) and isinstance(part, list):
+        return [as_given(*both, type.item) for both in zip(argument, part, strict=True)]
     if record is None or not isinstance(argument, Mapping | list):
         return part
     if isinstance(part, np.ndarray) and axes is not None:  # the axes of a batch are in front

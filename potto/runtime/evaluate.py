@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 
 from potto.calculus.surfaces.discontinuities import TooDeep
-from potto.core.printer import format_term
 from potto.core.terms import Data, Integral, Sum, Term
 from potto.diagnostics import PottoError, Related
 from potto.integrate.events import INFINITE, ROUGH, Shortfall
@@ -30,7 +29,7 @@ from potto.runtime.evaluation.duals import call_derivative, call_paired
 from potto.runtime.evaluation.folds import fold
 from potto.runtime.evaluation.functions import Closure, Derivative
 from potto.runtime.evaluation.kinks import note_kink
-from potto.runtime.evaluation.linker import Linker
+from potto.runtime.evaluation.linker import Linker, Named
 from potto.runtime.evaluation.machine import Machine, Semantics
 from potto.runtime.evaluation.record import BOXES_FOR_EVALUATIONS, Record
 from potto.runtime.evaluation.selection import chosen, lazy
@@ -79,9 +78,10 @@ class Program:
     """The definitions that terms refer to, for any number of evaluations; those `held` have their values already."""
 
     def __init__(
-        self, lookup: Lookup, held: Mapping[tuple[str, str], Value] | None = None, places: Places | None = None
-    ) -> None:
-        self.linker, self.places = Linker(lookup, held), places
+        self, lookup: Lookup, held: Mapping[tuple[str, str], Value] | None = None, places: Places | None = None,
+        named: Named | None = None,
+    ) -> None:  # fmt: skip
+        self.linker, self.places = Linker(lookup, held, named), places
         self._direct: dict[Term, Direct | Around | None] = {}
 
     def machine(self, settings: Settings) -> Machine:
@@ -185,7 +185,7 @@ def report(value: Value, machine: Machine, clock: Clock) -> Estimate:
     method = "exact" if not record.methods else "+".join(sorted(record.methods))
     answer = partial(
         Estimate, evals=record.evaluations, seconds=clock.seconds, compile_seconds=clock.spent,
-        plan_seconds=clock.planning, method=method, notes=tuple(_notes(record)), stats=stats_of(record, clock),
+        plan_seconds=clock.planning, method=method, notes=tuple(_notes(machine)), stats=stats_of(record, clock),
     )  # fmt: skip
     if isinstance(value, Closure):
         kind = "derivative of a function" if isinstance(value, Derivative) else "function"
@@ -273,12 +273,19 @@ def _missing(flat: list[tuple[Any, Any]], machine: Machine) -> Shortfalls:
     return {why: where for why, where in reasons.items() if np.any(where)}
 
 
-def _notes(record: Record) -> list[OneSided]:
+def _notes(machine: Machine) -> list[OneSided]:
+    if not machine.record.edges:
+        return []
+    from potto.runtime.integration.arrays import in_places  # loaded with the first integral: most answers have no notes
+
+    def written(term: Term) -> str:
+        return machine.linker.written(in_places(term))
+
     out: list[OneSided] = []
-    for edge in record.edges:
+    for edge in machine.record.edges:
         what = edge.cause
-        other = None if what.other is None else f"{format_term(what.other)} = 0"
-        surface = None if what.surface is None else f"{format_term(what.surface)} = 0"
+        other = None if what.other is None else f"{written(what.other)} = 0"
+        surface = None if what.surface is None else f"{written(what.surface)} = 0"
         backward, forward, before, beyond = map(np.squeeze, edge.sides)
         note = OneSided(
             what.variable, surface, backward, forward, other, what.fold, before, beyond, what.kink, what.along

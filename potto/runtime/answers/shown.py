@@ -102,9 +102,12 @@ def named_answer(estimate: Estimate, type: Type) -> Estimate:
 
 
 def json_number(value: Any) -> Any:
-    """A number for JSON: all its digits; nan and infinities as strings. Tuples, lists and arrays as arrays."""
+    """A number for JSON: all its digits; nan and infinities as strings. Tuples, lists and arrays as arrays, and so
+    are records, whose parts have their places."""
     if value is None:
         return None
+    if isinstance(value, Mapping):
+        value = tuple(value.values())
     if isinstance(value, tuple | list):
         return [json_number(item) for item in value]
     if isinstance(value, np.ndarray) and value.ndim:

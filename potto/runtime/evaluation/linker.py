@@ -10,6 +10,7 @@ from typing import Any
 
 from potto.calculus.inlining.numbers import with_numbers
 from potto.calculus.surfaces.branch_cuts import opened
+from potto.core.printer import format_term
 from potto.core.terms import Data, Deriv, Global, Integral, Lam, Term, postorder
 from potto.diagnostics import PottoError
 from potto.integrate.outline import Outlines
@@ -20,19 +21,24 @@ from potto.projects.settings import Settings
 from potto.runtime.evaluation.reach import Reach
 from potto.runtime.evaluation.written_in import WrittenIn
 
+Definitions = Mapping[tuple[str, str], Term]
+Named = Callable[[Term, Definitions], Term]
+
 
 class Linker:
     """The definitions that a program refers to. `lookup` gives the term of a definition or raises PottoError.
 
-    held: definitions that have a value already, which is not computed again.
+    held: definitions that have a value already, which is not computed again. named: what gives a term, for people, the
+    names that these definitions know its parts by.
     """
 
     def __init__(
         self,
         lookup: Callable[[str, str], Term],
         held: Mapping[tuple[str, str], Value] | None = None,
+        named: Named | None = None,
     ) -> None:
-        self.lookup = lookup
+        self.lookup, self._named = lookup, named
         self.held = held if held is not None else {}
         self.terms: dict[tuple[str, str], Term] = {}
         self.exactness: dict[Term, bool] = {}
@@ -53,6 +59,10 @@ class Linker:
             self.terms[key] = self.ready(self.lookup(module, name))
             counts.linked += 1
         return self.terms[key]
+
+    def written(self, term: Term) -> str:
+        """A term as the program would write it."""
+        return format_term(term if self._named is None else self._named(term, self.terms))
 
     def ready(self, term: Term) -> Term:
         """The term as it is evaluated: with branch cuts told, and numbers in the place of their names."""

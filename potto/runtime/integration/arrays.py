@@ -1,11 +1,11 @@
 """Arrays end where an integral begins: what it reads of them is found beside it, and it integrates numbers.
 
-Owns `without_arrays`, `in_numbers` and `as_written`.
+Owns `without_arrays`, `in_numbers`, `in_places` and `as_written`.
 """
 
 from __future__ import annotations
 
-from functools import lru_cache
+from functools import lru_cache, reduce
 
 import numpy as np
 from msgspec.structs import replace
@@ -171,3 +171,14 @@ def in_names(name: str, value: Value, env: Env) -> Term:
         env[name] = value
         return var(name)
     return tuple_(in_names(f"{name}.{place}", item, env) for place, item in enumerate(value))
+
+
+def in_places(term: Term) -> Term:
+    """A term with names of parts of tuples, as a program has it: with the tuples and their places."""
+    found: Read = {}
+    for name in term.free:
+        whole, *places = name.split(".")
+        if places and all(place.isdecimal() for place in places):
+            start: Term = var(whole)
+            found[name] = reduce(proj, map(int, places), start)
+    return substitute(term, found) if found else term
