@@ -13,6 +13,9 @@ import pytest
 from mpmath import mp
 
 import potto
+from potto.integrate.pieces import Sums
+from potto.kernels.cells import Value
+from potto.runtime.integration.problem import Problem
 
 INF = math.inf
 
@@ -257,3 +260,22 @@ def test_members_of_a_batch_on_a_bound_tell_what_each_tells_alone(count: int) ->
     w = np.arange(1.0, count + 1)
     (note,) = potto.grad(f, "t")(np.ones(count), w).notes
     assert note.backward == pytest.approx(2 * w, rel=1e-13) and note.forward == pytest.approx(w, rel=1e-13)
+
+
+@pytest.mark.parametrize(("t", "backward", "forward"), [(0.0, 0.0, math.pi), (1.0, math.pi, math.pi)])
+def test_all_places_beside_a_fold_are_one_batch(
+    t: float, backward: float, forward: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Six of them, three on either side. A disc that appears, and one that comes to touch its box: pi*t is its area,
+    to 1e-11 of what three steps leave."""
+    sizes, own = [], Problem.beside
+
+    def counted(problem: Problem, env: dict[str, Value], batch: int | None = None) -> Sums:
+        sizes.append(batch)
+        return own(problem, env, batch)
+
+    monkeypatch.setattr(Problem, "beside", counted)
+    answer = rate("integral ([-1, 1], [-1, 1]) [x^2 + y^2 < t] d(x, y)", t)
+    sides = [(float(note.backward), float(note.forward)) for note in answer.notes] or [(answer.tangent,) * 2]
+    assert sides == [pytest.approx((backward, forward), abs=1e-11)]
+    assert sizes == [6]

@@ -1,6 +1,6 @@
 """Derivatives where nothing at the parameters tells them: what those beside the parameters lead to.
 
-Owns `approached`, and values that are `moved`.
+Owns `approached`, `led_to`, and values that are `moved`.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from potto.kernels.cells import Array, Cell, Value, all_cells, map_cells
 
 APART = 2.0**-8
 CLOSER = 2.0**-8  # each step by this part of the one before
+NEARER = CLOSER ** np.arange(3.0)  # the steps that are taken, as parts of the first one
 # What successive differences may be of the one before where there is a limit, and what is no difference at all.
 SETTLING, SAME = 0.75, 1e-6
 MISSED = 1 / 16  # the least part of what is extrapolated that may be wrong
@@ -44,7 +45,8 @@ def approached(
     them lead to another one the derivative is infinite. rtol: as accurate as that where derivatives are smooth on that
     side; else what three steps tell is enough.
     """
-    limit, missed = _led_to([at(step * CLOSER**i) for i in range(3)], here, step * CLOSER**2)
+    near = step * NEARER
+    limit, missed = led_to([at(float(h)) for h in near], here, near[-1])
     if rtol is None or (np.isfinite(limit) & (missed <= rtol * np.abs(limit))).all():
         return limit, missed
     finer = [step * APART**-1.75 * 0.5**i for i in range(FINE)]
@@ -55,7 +57,7 @@ def approached(
     return _smooth(found, np.array(finer), here, limit, missed)
 
 
-def _led_to(found: Sequence[Parts], here: tuple[Array, Array], step: float) -> tuple[Array, Array]:
+def led_to(found: Sequence[Parts], here: tuple[Array, Array], step: float) -> tuple[Array, Array]:
     """What three steps towards the parameters, of which `step` is the last, lead to, and how far off that may be."""
     slopes = [np.where(np.isfinite(et), t, np.nan) for _, _, t, et in found]
     noise = np.sum([et for *_, et in found], axis=0)

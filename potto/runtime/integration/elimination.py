@@ -5,6 +5,8 @@ Owns `step_by_step` and `eliminated`.
 
 from __future__ import annotations
 
+import numpy as np
+
 from potto.integrate.elimination.recursion import AFFORDABLE, Eliminated, one_by_one
 from potto.integrate.events import Fold
 from potto.integrate.pieces import Sums
@@ -42,10 +44,13 @@ def _member(known: Eliminated, problem: Problem) -> Sums | None:
     """One integral, looked at from both sides where a surface folds in the outermost variable."""
 
     def tabled(there: Problem) -> Sums:
-        found = one_by_one(known, there.machine, there.env)
-        if found is None:
-            raise _NotEvaluated
-        return found
+        rows = []
+        for i in range(there.batch):
+            found = one_by_one(known, there.machine, there.picked(np.array([i])).env)
+            if found is None:
+                raise _NotEvaluated
+            rows.append(found)
+        return Sums.joined(rows)
 
     row = one_by_one(known, problem.machine, problem.env, AFFORDABLE)
     folds = problem.events.every(Fold)

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 
 import numpy as np
 from msgspec.structs import replace
@@ -23,12 +24,22 @@ from potto.integrate.decomposition.sections import searched_rows
 from potto.integrate.events import BOUNDLESS, INNER, Degenerate, Fold, OneSidedDerivatives, TwoSided
 from potto.integrate.pieces import Sums, still
 from potto.integrate.plan import Plan
-from potto.kernels.cells import Array, Cell
-from potto.runtime.evaluation.beside import APART, SAME, Parts, approached, moved, moving, parameter_step
+from potto.kernels.cells import Array, Bools, Cell
+from potto.runtime.evaluation.beside import (
+    APART,
+    NEARER,
+    SAME,
+    Parts,
+    approached,
+    led_to,
+    moved,
+    moving,
+    parameter_step,
+)
 from potto.runtime.evaluation.machine import Machine
 from potto.runtime.integration.attempts import accurate
 from potto.runtime.integration.choices import orders
-from potto.runtime.integration.problem import Problem
+from potto.runtime.integration.problem import Mixed, Problem
 from potto.runtime.integration.quadrature import iterated
 
 # The parameters' steps that are tried, and how far apart what folds may be after one, as a part of the range.
@@ -179,8 +190,36 @@ def _sides(problem: Problem, plan: Plan, members: Sequence[int], where: Fold | N
         for d in range(problem.machine.directions):
             step = _step(one, plan, d, where)
             if step is not None:
-                (backward, before), (forward, behind) = (beside(one, d, sign * step, here) for sign in (-1.0, 1.0))
+                (backward, before), (forward, behind) = _led_to_both(one, d, step, here)
                 yield member, d, backward[:, 0], forward[:, 0], (before[:, 0], behind[:, 0])
+
+
+def _led_to_both(problem: Problem, d: int, step: float, here: Sums) -> list[tuple[Array, Array]]:
+    """What `beside` finds of one integral on either side, with all places that are looked at as one batch."""
+    steps = [sign * step * NEARER for sign in (-1.0, 1.0)]
+    looks = _at_each(problem, d, np.concatenate(steps))
+    return [
+        led_to([_parts(look, here, d) for look in near], (here.v, here.e), own[-1])
+        for near, own in zip((looks[: NEARER.size], looks[NEARER.size :]), steps, strict=True)
+    ]
+
+
+def _at_each(problem: Problem, d: int, steps: Array) -> list[Sums | None]:
+    """One integral after each of these steps: together, and those of which nothing is known so by themselves."""
+    found: list[Sums | None] = [None] * steps.size
+    if not problem.machine.overdrawn():
+        with suppress(Mixed):
+            whole = problem.beside({n: moved(v, steps, d) for n, v in problem.env.items()}, steps.size)
+            known: Bools = np.logical_and.reduce(np.isfinite(np.concatenate((whole.e, *whole.et))))
+            found = [whole.pick(np.array([i])) if known[i] else None for i in range(steps.size)]
+    return [_after(problem, d, float(h)) if look is None else look for look, h in zip(found, steps, strict=True)]
+
+
+def _after(problem: Problem, d: int, step: float) -> Sums | None:
+    """What there is after a step; None where far more than the budget is spent: each look costs some nodes."""
+    if problem.machine.overdrawn():
+        return None
+    return problem.beside({n: moved(v, step, d) for n, v in problem.env.items()})
 
 
 def beside(problem: Problem, d: int, step: float, here: Sums, rtol: float | None = None) -> tuple[Array, Array]:
@@ -191,13 +230,17 @@ def beside(problem: Problem, d: int, step: float, here: Sums, rtol: float | None
     """
 
     def at(h: float) -> Parts:
-        if problem.machine.overdrawn():
-            unknown, slope = np.full_like(here.v, np.nan), np.full_like(here.t[:, d], np.nan)
-            return unknown, np.full_like(here.e, np.inf), slope, np.full_like(here.et[:, d], np.inf)
-        part = problem.beside({n: moved(v, h, d) for n, v in problem.env.items()})
-        return part.v, part.e, part.t[:, d], part.et[:, d]
+        return _parts(_after(problem, d, h), here, d)
 
     return approached(at, step, (here.v, here.e), rtol)
+
+
+def _parts(found: Sums | None, here: Sums, d: int) -> Parts:
+    """The values and the derivatives in a direction; not known where nothing was found."""
+    if found is None:
+        unknown, slope = np.full_like(here.v, np.nan), np.full_like(here.t[:, d], np.nan)
+        return unknown, np.full_like(here.e, np.inf), slope, np.full_like(here.et[:, d], np.inf)
+    return found.v, found.e, found.t[:, d], found.et[:, d]
 
 
 def _step(problem: Problem, plan: Plan, d: int, where: Fold | None) -> float | None:

@@ -165,9 +165,10 @@ class Problem:
         """The problem of one member by itself, apart."""
         return self.picked(np.array([number])).apart()
 
-    def beside(self, env: dict[str, Value]) -> Sums:
-        """What members come to at other parameters; what is met there is forgotten."""
-        return self.solver(self.at(env, machine=self.machine.apart(), outermost=False))
+    def beside(self, env: dict[str, Value], batch: int | None = None) -> Sums:
+        """What members, or a batch in their place, come to at other parameters; what is met there is forgotten."""
+        batch = self.batch if batch is None else batch
+        return self.solver(self.at(env, machine=self.machine.apart(), outermost=False, batch=batch))
 
     @property
     def flat(self) -> bool:
