@@ -11,10 +11,12 @@ import json
 import re
 from array import array
 from collections.abc import Sequence
+from contextlib import suppress
 from itertools import chain
 from math import isfinite
 from typing import Any
 
+import msgspec
 from msgspec import Struct
 
 from potto.data.mistakes import MALFORMED, DataMistake, Refused, bad_row, counted, malformed, quoted
@@ -24,6 +26,7 @@ from potto.data.values import DEEPEST, Array, Number, Table, Value
 Path = tuple[str | int, ...]
 
 _TOKEN = re.compile(r'"(?:[^"\\]|\\.)*"|[\[\]{}:,]|[^\s\[\]{}:,"]+')
+_SIGNED = re.compile(r"-0(?![.\deE])")
 _DEEP = f"lists are nested more than {DEEPEST} deep"
 _RECORDS = 'write an object of lists, as in {"x": [1, 2], "y": [3, 4]}'
 _BESIDE = "lists beside each other are equally long, so that they make an array"
@@ -61,6 +64,10 @@ class _Box(Struct, frozen=True):
 
 def nested(text: str) -> Value:
     """What a JSON text holds."""
+    quick = _quickly(text)
+    if quick is not None:
+        with suppress(OverflowError):  # of a whole number that no double is near
+            return _value(_Box(text, [quick]))
     try:
         data = json.loads(text, parse_int=float, object_pairs_hook=_object)
     except json.JSONDecodeError as error:
@@ -74,12 +81,34 @@ def nested(text: str) -> Value:
     return _value(_Box(text, [data]))
 
 
+def _quickly(text: str) -> Any:
+    """The same as by `json`, in a fifth of the time, with whole numbers as such; None for a text that is no JSON, may
+    have a name twice, or has a zero whose sign would be lost."""
+    if _SIGNED.search(text):
+        return None
+    try:
+        found = msgspec.json.decode(text)
+    except (msgspec.MsgspecError, UnicodeError, RecursionError):
+        return None
+    # There are at least as many colons as names, and no more names in objects: where these are equal, none is twice.
+    colons, level = text.count(":"), [found]
+    while level and colons > 0:
+        objects = [entry for entry in level if type(entry) is dict]
+        colons -= sum(map(len, objects))
+        level = [*chain.from_iterable(entry for entry in level if type(entry) is list),
+                 *chain.from_iterable(entry.values() for entry in objects)]  # fmt: skip
+    return None if colons else found
+
+
 def _value(box: _Box) -> Value:
     """A number, an array or a table: lists are opened level by level, and each level is of one kind."""
     while (kinds := set(map(type, box.entries))) == {list}:
         box = _opened(box)
     if kinds == {dict}:
         return _table(box)
+    if int in kinds:
+        entries = [float(entry) if type(entry) is int else entry for entry in box.entries]
+        box, kinds = _Box(box.text, entries, box.steps), {*kinds, float} - {int}
     if kinds != {float}:
         raise _odd(box)
     numbers = box.entries

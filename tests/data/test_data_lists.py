@@ -12,6 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from potto.data import Table, shape_of, values_of
+from potto.data.lists import nested
+from potto.data.mistakes import Refused
+from potto.data.values import Array
 
 reals = st.floats(allow_nan=False, allow_infinity=False)
 numbers = st.one_of(reals, st.integers(-(2**53), 2**53))
@@ -119,3 +122,37 @@ def test_mistakes(text: str, code: str, row: int | None, column: int | None, mes
 def test_large_whole_numbers() -> None:
     assert plain("d.json", "[1" + "0" * 300 + ", 2]") == [1e300, 2.0]
     assert mistake("d.json", "1" + "0" * 5000).message == "line 1: inf is not finite"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "[-0, 0, -0.0]",
+        "[0, 5e-324, 2.2250738585072011e-308, 1.7976931348623157e308, 0.1e-6, 123456789012345678901234567890]",
+        '{"a:b": [1, 2.5], "c": {"d": [[1], [2]]}}',  # a colon that stands in a name
+        '[{"x": 1, "y": 1e23}, {"x": 9007199254740993, "y": -3}]',
+    ],
+)
+def test_numbers_are_those_that_python_reads(text: str) -> None:
+    """Bit by bit, also where a whole number is too large for a double to have all its digits."""
+
+    def flat(value: object) -> list[float]:
+        if isinstance(value, dict):
+            return [number for item in value.values() for number in flat(item)]
+        return [number for item in value for number in flat(item)] if isinstance(value, list) else [value]  # type: ignore[list-item]
+
+    def told(value: object) -> list[float]:
+        if isinstance(value, Table):
+            return [number for _, item in value.fields for number in told(item)]
+        return [*value.numbers] if isinstance(value, Array) else [value]  # type: ignore[list-item]
+
+    known = json.loads(text, parse_int=float)
+    if isinstance(known, list) and isinstance(known[0], dict):
+        known = {name: [entry[name] for entry in known] for name in known[0]}
+    assert [*map(float.hex, told(nested(text)))] == [*map(float.hex, flat(known))]
+
+
+def test_a_name_that_is_given_twice_is_told_among_many() -> None:
+    with pytest.raises(Refused) as refused:
+        nested('[{"x": 1}, {"x": 1, "x": 2}]')
+    assert "twice" in refused.value.mistake.message
