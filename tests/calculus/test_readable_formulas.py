@@ -182,3 +182,20 @@ def test_the_state_of_a_fold_has_the_fields_of_the_first_one() -> None:
     facts = derivative_facts(library.db, library.put("<text>", text), "f")
     assert facts is not None and facts.body is not None
     assert "s.speed" in facts.body.value and facts.body.value.endswith(".at") and "s.0.0" not in str(facts)
+
+
+@pytest.mark.parametrize(
+    ("program", "read"),
+    [
+        ("sum i in 1..5 (integral [0, 1] [x*abs(i) < t/i] d(x))", "sum i in 1..5 (dt/i^2*[t > 0 and t < i^2])"),
+        ("sum i in -5..-1 (integral [0, 1] [x*i < t] d(x))", "sum i in -5..-1 (-dt/i*[t < 0 and i < t])"),
+        ("sum i in -1..5 (integral [0, 1] [x*i < t] d(x))", "sum i in -1..5 (dt/abs(i)*[t*i > 0 and t/i < 1])"),
+        ("sum i in 1..5 (sum j in i..9 (integral [0, 1] [j*x < t] d(x)))",
+         "sum i in 1..5 (sum j in i..9 (dt/j*[t > 0 and t < j]))"),
+    ],
+)  # fmt: skip
+def test_an_index_has_the_sign_of_its_range(program: str, read: str) -> None:
+    """The third one has none: i may be -1, and 0."""
+    library = Library()
+    facts = derivative_facts(library.db, library.put("<text>", f"def f(t) {program}"), "f")
+    assert facts is not None and facts.derivative == read

@@ -7,7 +7,7 @@ what moves each. Functions that are parameters stay symbols (`symbols`).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 
 from msgspec.structs import replace
 
@@ -28,7 +28,7 @@ from potto.calculus.explanation.symbols import NoFormula, Rewrite, Words, over_f
 from potto.calculus.inlining.expand import Resolve, heads_of
 from potto.calculus.solving.pivots import NoClosedForm, Root, pivots
 from potto.calculus.solving.solve import factors
-from potto.calculus.surfaces.branch_assignment import box_of, branches_of
+from potto.calculus.surfaces.branch_assignment import Box, box_of, branches_of, with_index
 from potto.calculus.surfaces.branch_assignment import unguarded as where_it_exists
 from potto.calculus.surfaces.branch_cuts import opened
 from potto.calculus.surfaces.case_split import unnested
@@ -224,7 +224,8 @@ def _integral(
     node = plainly_named(node, words.names)
     inside = {n: t for n, t in tangents.items() if n not in node.variables}
     indices = [name for name, _, _ in around]
-    names, box = (*node.variables, *indices), box_of(node)
+    names, ranges = (*node.variables, *indices), _ranges(around)
+    box = {**ranges, **box_of(node)}
     deltas: list[str] = []
     meeting: list[str] = []
     boundary: list[str] = []
@@ -243,9 +244,10 @@ def _integral(
         plain = _without_deltas(node)
         reason = "" if plain is None else _why_searched(plain)
         if plain is not None and level_set(plain) is None:
-            bounds = [words.text(t, *indices) for t in at_bounds(plain, rate)]
+            bounds = [words.text(t, *indices, box=ranges) for t in at_bounds(plain, rate)]
             swept = at_surfaces(plain, frozenset(inside), rate, True)
-            boundary = [words.text(t, *indices) for t in swept if not (isinstance(t, Integral) and level_set(t))]
+            swept = [t for t in swept if not (isinstance(t, Integral) and level_set(t))]
+            boundary = [words.text(t, *indices, box=ranges) for t in swept]
     except (NoClosedForm, NotSmooth, NoFormula) as problem:
         reason = str(problem)
     except PottoError as problem:
@@ -264,6 +266,13 @@ def _integral(
         tuple(meeting),
         ", ".join(f"{name} in {words.plain(lo)}..{words.plain(hi)}" for name, lo, hi in around),
     )
+
+
+def _ranges(around: Iterable[Each]) -> Box:
+    box: Box = {}
+    for index in around:
+        box = with_index(box, *index)
+    return box
 
 
 def _without_deltas(node: Integral) -> Integral | None:

@@ -19,16 +19,20 @@ from potto.calculus.explanation.alternatives import in_one
 from potto.calculus.explanation.brackets import Condition, between, conditions, fewer, opposite, plainer
 from potto.calculus.explanation.brackets import bracket as bracket_of
 from potto.calculus.explanation.factors import Factors, factored, is_tangent, written
-from potto.calculus.surfaces.branch_assignment import box_of
+from potto.calculus.surfaces.branch_assignment import box_of, with_index
 from potto.core.polynomials import Monomial, Polynomial, shared_by, without
 from potto.core.printer import format_term
 from potto.core.terms import (
+    ONE,
     ZERO,
+    Array,
     Branch,
     Const,
+    Fold,
     If,
     Integral,
     Prim,
+    Sum,
     Term,
     add,
     branch,
@@ -51,6 +55,7 @@ from potto.core.terms import (
 )
 
 Box = Mapping[str, tuple[float, float]]
+_Binder = Integral | Sum | Array | Fold
 _ARITHMETIC = ("add", "neg", "mul", "div", "pow", "sqrt", "exp")
 _DIGITS = 15  # of a number that may have been rounded
 _LONG = 4000  # characters of a formula that nobody reads, beyond which nothing is tried
@@ -119,22 +124,32 @@ def _bound(term: Term) -> frozenset[str]:
 
 
 def _decided(term: Term, box: Box, work: _Work) -> Term:
-    """Without the brackets that are the same everywhere in the domain of the integral that they stand in."""
+    """Without the brackets, and sizes of what has one sign, that are told by the ranges of the variables and indices
+    around them."""
     known: dict[Term, Term] = {}
-    for node in postorder(term, below=lambda n: () if isinstance(n, Integral) else children(n)):
-        known[node] = _inside(node, box, work) if isinstance(node, Integral) else _undecided(node, known, box, work)
+    for node in postorder(term, below=lambda n: () if isinstance(n, _Binder) else children(n)):
+        known[node] = _inside(node, box, work) if isinstance(node, _Binder) else _undecided(node, known, box, work)
     return known[term]
 
 
-def _inside(node: Integral, box: Box, work: _Work) -> Term:
-    inner = {**box, **box_of(node)}
-    parts = children(node)
-    return work.node(rebuild(node, tuple(_decided(part, inner if part is node.body else box, work) for part in parts)))
+def _inside(node: _Binder, box: Box, work: _Work) -> Term:
+    match node:
+        case Integral():
+            inner: Box = {**box, **box_of(node)}
+        case Array():
+            inner = with_index(box, node.variable, ZERO, sub(node.size, ONE))
+        case _:
+            inner = with_index(box, node.variable, node.lo, node.hi)
+    *parts, body = children(node)
+    return work.node(rebuild(node, (*(_decided(part, box, work) for part in parts), _decided(body, inner, work))))
 
 
 def _undecided(node: Term, known: Mapping[Term, Term], box: Box, work: _Work) -> Term:
     parts = children(node)
     new = rebuild(node, tuple(known[part] for part in parts)) if parts else node
+    if isinstance(new, Prim) and new.op == "abs" and new.free & box.keys():
+        bounds = range_of(new.args[0], box)
+        new = new.args[0] if bounds.lo >= 0 else neg(new.args[0]) if bounds.hi <= 0 else new
     if isinstance(new, Branch):
         taken = _taken(new, range_of(new.surface, box))
         if taken is not None:

@@ -123,6 +123,11 @@ def box_of(node: Integral) -> dict[str, tuple[float, float]]:
     return box
 
 
+def with_index(box: Box, name: str, low: Term, high: Term) -> dict[str, tuple[float, float]]:
+    """A box with the range of an index as well; where that is empty, nothing is asked of it."""
+    return {**box, name: (range_of(low, box).lo, range_of(high, box).hi)}
+
+
 def flipping(
     branches: Iterable[Branch], variable: str, at: Term, known: Sequence[Branch] = (), bends: int = 3
 ) -> list[Flip]:
