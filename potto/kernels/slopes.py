@@ -64,7 +64,7 @@ def _sum(parts: Sequence[str], at: Writing) -> str | None:
 def _of_builtin(node: Prim, args: Sequence[Loss], values: Mapping[Term, str], slopes: Slopes, at: Writing) -> Loss:
     entry, own = PRIMITIVES[node.op], values[node]
     names = [values[arg] for arg in node.args]
-    if entry.truth:
+    if entry.truth or (node.op == "add" and all(map(_is_whole, names))):
         return EXACT
     if node.op == "neg":
         return args[0]
@@ -73,14 +73,28 @@ def _of_builtin(node: Prim, args: Sequence[Loss], values: Mapping[Term, str], sl
     rests, rounds = _own(node, names, own, at)
     if all(arg.none for arg in args) and (node.op != "add" or len(args) == 2):
         return Loss(rounds, _sum(rests, at))
+    if node.op == "pow":
+        given = (own, names[0], _sum(_all_of(args[1], names[1]), at) or "0.0")
+        rests.append(f"{at.ufunc('support.by_exponent')}({', '.join(given)})")
+        args, names = args[:1], names[:1]
     more = max(len(args) - 2, 0) if node.op == "add" else 0  # sums on the way
     steep = ["1.0"] * len(args) if node.op == "add" else slopes(node)
-    for arg, name, slope in zip(args, names, steep, strict=True):
-        if arg.part + more:
-            rests.append(f"{(arg.part + more) * UNIT_ROUNDOFF!r}*abs({at.product(slope, name)})")
-        if arg.rest:
-            rests.append(f"abs({at.product(slope, arg.rest)})")
+    for arg, name, slope in zip(args, names, steep[: len(args)], strict=True):
+        rests += [f"abs({at.product(slope, x)})" for x in _all_of(Loss(arg.part + more, arg.rest), name)]
     return Loss(rounds, _sum(rests, at))
+
+
+def _is_whole(name: str) -> bool:
+    """Whether a variable is a whole number, written as one."""
+    try:
+        return float(name).is_integer()
+    except ValueError:
+        return False
+
+
+def _all_of(loss: Loss, name: str) -> list[str]:
+    """What a number is off in all, as summands."""
+    return [*([f"{loss.part * UNIT_ROUNDOFF!r}*abs({name})"] if loss.part else []), *([loss.rest] if loss.rest else [])]
 
 
 def _own(node: Prim, names: Sequence[str], own: str, at: Writing) -> tuple[list[str], float]:

@@ -120,6 +120,12 @@ def beside(surface: Number, tangent: Number, side: float) -> Mask:
     return (surface > 0) | ((surface == 0) & (side * tangent > 0))
 
 
+def by_exponent(power: Number, base: Number, off: Number) -> Number:
+    """What a power is off by what its exponent is: at a base that is not positive this is whole, and so exact."""
+    with np.errstate(all="ignore"):
+        return np.where(np.asarray(base) > 0, np.abs(power * np.log(np.abs(base))) * off, 0.0)
+
+
 def select_value(mask: Mask, a: Value, b: Value) -> Value:
     """`select` for values of any kind; both must have the same structure, but for functions, of which it is either."""
     if not isinstance(mask, np.ndarray):

@@ -290,7 +290,8 @@ class _Along(Struct, frozen=True, dict=True):
                     continue
                 part = sum(0.0 if r is None else r * w for r, w in ((rounded, 1.0), (value.et[k], np.abs(speed))))
                 doubt = np.abs(there - speed) + part / np.abs(slope)
-                found.append(np.where(np.isfinite(doubt), doubt, 0.0))
+                unknown = np.isnan(part) & np.isfinite(speed)
+                found.append(np.where(np.isfinite(doubt), doubt, np.where(unknown, np.inf, 0.0)))
         return tuple(found)
 
     def beside_poles(self, root: Array) -> list[Array]:
