@@ -44,7 +44,9 @@ LEAST = 2048  # members, from which on a batch has blocks: below, the calls for 
 PILOT, MOST = 1 << 6, 1 << 18
 ENOUGH, LITTLE, LONG = 0.1, 0.005, 1.0
 FALLS = 0.6
-COLD = 2.0  # seconds, less than which the first run may only have been slow because it was the first
+# Seconds, less than which a run may only have been slow because something was made for it: the first one, and one whose
+# members cost so many times what those of fewer did (kernels are made at the size that first needs them).
+COLD, DEARER = 2.0, 2.0
 TILE = 0.5  # seconds of a tile by the clock, at the most
 SHARES = 4  # tiles a worker gets at least, where there are enough blocks: who is done first takes more
 WORTH = 0.3  # seconds of work from which on others are asked to help; executors may say otherwise, by `worth`
@@ -170,7 +172,7 @@ class _Tiles(Struct):
         tried, each = size, math.inf
         while not most and 2 * size <= self.count and size < MOST:
             self._alone((0, size))
-            if ENOUGH <= self.spent < COLD and each == math.inf:
+            if ENOUGH <= self.spent < COLD and (each == math.inf or self.spent > DEARER * each * size):
                 self._put_aside()
                 self._alone((0, size))
             fallen, each = self.spent < FALLS * each * size, self.spent / size

@@ -200,6 +200,22 @@ def test_blocks_are_large_where_a_block_costs_more_than_its_members(
     assert tiles._Tiles(25600, lambda part: None, lambda parts: None, "key")._size() == size  # type: ignore[arg-type, return-value]
 
 
+def test_what_is_made_for_a_larger_block_does_not_count_as_its_members(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Kernels that 256 members are the first to need: 0.4 s once, where a member takes 0.1 ms."""
+    for name, seconds in (("ENOUGH", 0.1), ("LONG", 1.0)):
+        monkeypatch.setattr(tiles, name, seconds)
+    made: set[int] = set()
+
+    def alone(self: Any, part: tuple[int, int]) -> None:
+        size = part[1] - part[0]
+        self.spent = 1e-4 * size + 0.4 * (size in {64, 256} - made)
+        made.add(size)
+
+    monkeypatch.setattr(tiles._Tiles, "_alone", alone)
+    asked: Any = (25600, lambda part: None, lambda parts: None, "made")
+    assert tiles._Tiles(*asked)._size() == 1024
+
+
 def test_what_is_made_while_the_size_of_blocks_is_tried_is_told() -> None:
     module = potto.compile("def fresh(x) integral [0, 1] u*[u < x]*0.123456789 d(u)")
     first, second = (module.fresh(X) for _ in range(2))
