@@ -5,6 +5,7 @@ their cancellation, requests and notifications to the client, the codes of error
 
 - `io_.run` knows `Content-Length: n` in exactly that form, answers nothing to what is not JSON and takes a body that
   ends early for a message: `Carrier.carry` is given what `wire.messages` reads.
+- Importing it takes as long as checking a hundred definitions: see `lazy_types` and `later`.
 - `structure_message` is called for every object inside of a message, and makes classes that are taken apart again:
   messages stay plain JSON here.
 - `handle_message` raises for anything that is not a JSON-RPC message, and its sender waits for ever; a request before
@@ -23,19 +24,22 @@ import logging
 from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import Future, InvalidStateError
 from contextlib import suppress
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
-from potto_lsp import errors, lazy_types
+from potto_lsp import errors, later, lazy_types
 from potto_lsp.errors import RequestError
 from potto_lsp.wire import BadMessage, framed
 
+later.postpone()
 lazy_types.load()
 
-import cattrs  # noqa: E402  # what follows imports lsprotocol's types, which must be there already
-from lsprotocol.types import ResponseError  # noqa: E402
+from lsprotocol.types import ResponseError  # noqa: E402  # it must be there already, like all that is postponed
 from pygls.exceptions import JsonRpcException  # noqa: E402
 from pygls.protocol import JsonRPCProtocol  # noqa: E402
 from pygls.server import JsonRPCServer  # noqa: E402
+
+if TYPE_CHECKING:
+    from cattrs import Converter
 
 logger = logging.getLogger(__name__)
 Id = int | str
@@ -56,7 +60,7 @@ class Protocol(JsonRPCProtocol):
 
     _server: Carrier
 
-    def __init__(self, server: JsonRPCServer, converter: cattrs.Converter) -> None:
+    def __init__(self, server: JsonRPCServer, converter: Converter) -> None:
         super().__init__(server, converter)
         self._asked: dict[Id, Future[Any]] = {}  # what the client waits for
 
@@ -176,13 +180,18 @@ class Protocol(JsonRPCProtocol):
             self.writer.write(framed({"jsonrpc": self.VERSION, **data}))
 
 
+def _no_converter() -> Converter:
+    """What converts messages to classes and back: nothing, they stay plain JSON."""
+    return cast("Converter", None)
+
+
 class Carrier(JsonRPCServer):
     """A server of pygls that reads one stream on the thread that runs it, and knows when a session may ask what."""
 
     protocol: Protocol
 
     def __init__(self) -> None:
-        super().__init__(Protocol, cattrs.Converter)
+        super().__init__(Protocol, _no_converter)
 
     def carry(self, messages: Iterable[Any]) -> int:
         """Handle messages until `exit` or their end; the exit status."""

@@ -52,21 +52,10 @@ def _talk(reader: BinaryIO, writer: BinaryIO) -> int:
         return 1
     with memory.loading():
         greeted = greet(first, outbox)
-        _load_asyncio()
 
         from potto_lsp.server import Server
 
     return Server(chain([first], received), outbox, greeted).run()
-
-
-def _load_asyncio() -> None:
-    """Import asyncio, which pygls does, without `ssl`, which nobody here needs and which takes half as long again."""
-    if "ssl" not in sys.modules:
-        sys.modules["ssl"] = None  # type: ignore[assignment]  # so an import says that there is no such module
-        try:
-            import asyncio  # noqa: F401
-        finally:
-            del sys.modules["ssl"]
 
 
 def take_streams() -> tuple[BinaryIO, BinaryIO]:

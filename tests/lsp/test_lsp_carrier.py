@@ -124,3 +124,25 @@ def test_what_fails_is_an_error_without_a_traceback(made: tuple[Always, Written]
     assert errors[0] == {"code": -32603, "message": "internal error: ZeroDivisionError: a bug"}
     assert errors[1]["code"] == -32601
     assert isinstance(server.protocol, Protocol)
+
+
+POSTPONED = """
+import sys
+import potto_lsp.server
+waiting = [name for name in ("asyncio.events", "cattrs.converters", "lsprotocol._hooks", "ssl") if name in sys.modules]
+assert not waiting, waiting
+from lsprotocol import converters, types
+assert converters.get_converter().unstructure(types.Position(1, 2)) == {"line": 1, "character": 2}
+import asyncio
+async def three(): return 3
+assert not asyncio.iscoroutinefunction(len) and asyncio.iscoroutinefunction(three)
+assert asyncio.run(three()) == 3 and asyncio.iscoroutinefunction.__module__ == "asyncio.coroutines"
+import cattrs
+assert cattrs.Converter.__module__ == "cattrs.converters" and not hasattr(cattrs, "nothing")
+print("whole")
+"""
+
+
+def test_what_is_postponed_is_whole_when_it_is_looked_at() -> None:
+    done = subprocess.run([sys.executable, "-c", POSTPONED], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "whole"
