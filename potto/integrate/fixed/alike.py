@@ -85,16 +85,16 @@ def _of_one_form(
     number, truncated, rounding, gross = total
     whole, added = np.abs(number), together(env, gross.max(axis=0))
     whole[0] = np.abs(together(env, number[0]))
-    asked = 0.5 * np.maximum(machine.atol, machine.rtol * whole)
+    asked = np.maximum(machine.atol, machine.rtol * whole)
     most = CANCELS * added if batch > 1 else 0.0  # for one there are other ways
     left = np.maximum(most, min(machine.rtol, ROUNDED) * np.minimum(added, 1.0)) if batch > 1 else 0.0
-    fine = rounding <= np.maximum(asked, left)
-    fine[1:] |= added_up(env, number[1:], rounding[1:], 0.5 * machine.rtol)
-    fine &= truncated <= np.maximum(asked, most)
+    error = truncated + rounding
+    fine = error <= np.maximum(asked, left)
+    fine[1:] |= added_up(env, number[1:], error[1:], machine.rtol)
+    fine &= truncated <= np.maximum(0.5 * asked, most)
     done &= fine.all(axis=0)
     if not done.any():
         return None
-    error = truncated + rounding
     added = np.stack((gross[0], gross[1:].max(axis=0, initial=0.0)))
     for part in (number, error, added):
         part[:, ~done] = 0.0

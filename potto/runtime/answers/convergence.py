@@ -72,11 +72,26 @@ def allowance(term: Integral, sums: Sums, rtol: float) -> Any:
         return allowance_of_one(term, float(sums.gross[0, 0]), rates, rtol)
     most = np.inf if adds_nothing(term.body) else UNIT
     share = min(rtol, CANCELS)
-    value, rate = np.abs(sums.v).max(axis=0), np.abs(sums.t).max(axis=(0, 1), initial=0.0)
-    if sums.gross is not None:
-        value, rate = np.maximum(sums.gross[0], value), np.maximum(sums.gross[1], rate)
-    value = np.where(np.isfinite(value), np.minimum(value, most), 0.0)
-    return share * np.maximum(value, np.where(np.isfinite(rate), np.minimum(rate, UNIT), 0.0))
+    added = (None, None) if sums.gross is None else sums.gross
+    value, rate = _largest(sums.v, added[0], most), _largest(sums.t, added[1], UNIT)
+    np.maximum(value, rate, out=value)
+    value *= share
+    return value
+
+
+def _largest(numbers: Array, added: Array | None, most: float) -> Array:
+    """Per member of a batch, (B,), the largest of its numbers (..., B) without regard to sign and of what was added up
+    for them, up to `most`; 0 for what is infinite, or not a number. Over large batches it is memory that takes time, so
+    that there is as little of it as can be."""
+    rows = numbers.reshape(-1, numbers.shape[-1])
+    found = np.zeros(numbers.shape[-1]) if added is None else added.copy()
+    for row in rows:
+        np.maximum(found, row, out=found)
+        np.maximum(found, -row, out=found)
+    bad = ~np.isfinite(found)
+    np.minimum(found, most, out=found)
+    found[bad] = 0.0
+    return found
 
 
 def allowance_of_one(term: Integral, gross: float, rates: float, rtol: float) -> float:
@@ -140,9 +155,14 @@ def missed(value: Any, error: Any, within: Any, settings: Settings, drawn: bool)
         return {}
     v, e = np.abs(np.asarray(value, dtype=float)), np.asarray(error, dtype=float)
     v, e = np.broadcast_arrays(v, e)
+    limit = rtol * v
+    bad = np.asarray(~((e <= limit) & (limit < np.inf)))
+    if not bad.any():
+        return {}
     within = over(within, v.shape)
-    bad = ~((e <= rtol * v) | (e <= settings.atol) | (e <= within)) | np.isnan(v)
-    bad = np.where(np.isinf(v), ~np.isfinite(e), bad)  # an infinity may be known to be one
+    size, off, allowed = v[bad], e[bad], np.broadcast_to(within, v.shape)[bad]  # few of a large batch
+    wrong = ~((off <= settings.atol) | (off <= rtol * size) | (off <= allowed)) | np.isnan(size)
+    bad[bad] = np.where(np.isinf(size), ~np.isfinite(off), wrong)  # an infinity may be known to be one
     if not bad.any():
         return {}
     reasons: Shortfalls = {}

@@ -221,12 +221,14 @@ def poisoned(sums: Sums, env: dict[str, Value]) -> Sums:
     bad: Any = False
     for value in env.values():
         for cell in (value,) if isinstance(value, Cell) else value if isinstance(value, tuple) else ():
-            if isinstance(cell, Cell):
+            if isinstance(cell, Cell) and np.isnan(np.sum(cell.v)):  # in a third of the time of a look at each
                 bad = bad | (cell.v != cell.v)
     if bad is not False and np.any(bad):
         where = np.broadcast_to(bad, sums.v.shape[-1:])
         sums.v[:, where] = np.nan
     if sums.v.size == 1 and math.isfinite(sums.v[0, 0]):  # numpy takes its time over a single number
+        return sums
+    if not np.isnan(sums.v.sum()):
         return sums
     undefined = np.isnan(sums.v)
     if not undefined.any():
