@@ -15,6 +15,8 @@ import numpy as np
 import pytest
 
 import potto
+from potto.integrate.fixed.lowered import places_of
+from potto.kernels.cells import Cell
 
 PLAIN = np.linspace(-0.99, -0.01, 200)
 
@@ -211,3 +213,12 @@ def test_a_polynomial_from_a_turning_point_on() -> None:
     answer = answered("def f(t) integral [0, 1] x^2*[x^2 < t] d(x)", t)
     assert (np.abs(answer.value - t**1.5 / 3) <= answer.error + 1e-16).all()
     assert (np.abs(answer.tangent - t**0.5 / 2) <= answer.tangent_error + 2e-16).all()
+
+
+def test_errors_of_zero_are_nothing_that_machine_code_reads() -> None:
+    """Seeds of a tape have them: functions are the same as for seeds without, and read the tangent, not 1 for 0."""
+    seeds = {"a": Cell(0.5, None, (1.0, None), (0.0, None)), "b": Cell(0.25, 0.0, (None, 2.0), (None, 0.0))}
+    bare = {"a": Cell(0.5, None, (1.0, None), (None, None)), "b": Cell(0.25, None, (None, 2.0), (None, None))}
+    assert places_of("ab", seeds) == places_of("ab", bare)
+    unsure = {**bare, "b": Cell(0.25, None, (None, 2.0), (None, 1e-17))}
+    assert places_of("ab", unsure) != places_of("ab", bare)

@@ -118,10 +118,11 @@ def _told(axis: Axis) -> list[int]:
 
 
 def _parts(value: Value) -> list[tuple[Part, Any]]:
+    """The parts of a parameter that are something; errors of 0, which seeds of a tape have, are none."""
     assert isinstance(value, Cell)
     found = [(Part((), "v"), value.v), (Part((), "e"), value.e)]
     found += [(Part((), kind, d), x) for kind, row in (("t", value.t), ("et", value.et)) for d, x in enumerate(row)]
-    return [(part, x) for part, x in found if x is not None]
+    return [(p, x) for p, x in found if x is not None and (p.kind in ("v", "t") or isinstance(x, np.ndarray) or x)]
 
 
 def _part(value: Value, part: Part) -> Any:
