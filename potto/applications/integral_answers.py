@@ -77,8 +77,7 @@ class Answers:
         found = self._scene(name)
         wrt = self.wrt if self.wrt in found.parameters else found.moving
         count = len(found.regions(wrt))
-        ranges = found.ranges(found.values)
-        return {"values": found.values, "wrt": wrt, "indices": ranges, "integrals": count, **self._text(name)}
+        return {"values": found.values, "wrt": wrt, "indices": found.indices, "integrals": count, **self._text(name)}
 
     def _formulas(self, name: str) -> list[dict[str, str]]:
         found = derivative_text(self.world.db, self.file, name)
@@ -115,7 +114,8 @@ class Answers:
         seconds = time.perf_counter() - start
         return {
             "svg": svg, "numbers": msgspec.to_builtins(shot.numbers), "told": told(shot.view, shot.numbers, wrt),
-            "surfaces": _surfaces(shot), "remarks": remarks(shot.view), "seconds": seconds, "slow": seconds > FRAME,
+            "surfaces": _surfaces(shot), "remarks": remarks(shot.view), "indices": shot.indices, "seconds": seconds,
+            "slow": seconds > FRAME,
         }  # fmt: skip
 
 

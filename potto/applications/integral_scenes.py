@@ -23,6 +23,8 @@ from potto.ide.display.scenes import Scene, SceneParameter, scene
 from potto.kernels.errors import wrong_call
 from potto.modules import DefinitionTarget, resolve
 from potto.python.terms import TermFunction
+from potto.source import Span
+from potto.syntax import nodes
 from potto.types import groups_of, interface
 
 UNSAID = 0.5  # what a number is that nobody gives
@@ -30,13 +32,18 @@ PATIENCE = 0.1  # seconds: numbers that take longer wait until nothing is dragge
 AGAIN = 0.25  # seconds between numbers that do not fit into a frame
 
 
+Standing = tuple[float, float, float]  # of an index: the number that it stands on, the first and the last
+
+
 class Shot(Struct, frozen=True):
-    """One look: what is seen, and the numbers, if there was time for them."""
+    """One look: what is seen, and the numbers, if there was time for them. indices: where each stands, with its first
+    and its last number at these values."""
 
     view: IntegralView
     numbers: IntegralNumbers | None
     title: str
     wrt: str
+    indices: dict[str, Standing]
 
     @property
     def svg(self) -> str:
@@ -57,7 +64,7 @@ class IntegralScene:
         target = resolve(world.db, file, name)
         if not isinstance(target, DefinitionTarget):
             raise wrong_call(f"`{name}` is not defined here", "name a function of the program")
-        world.lookup(target.file, target.name)
+        world.need(file, nodes.Name(Span(0, 0), name))
         found = scene(world.db, target.file, target.name)
         if found is None:
             raise wrong_call(f"`{name}` is not a function of numbers", "name a function whose parameters are numbers, "
@@ -83,7 +90,8 @@ class IntegralScene:
         for index in self._indices:
             said = given.get(index.name)
             self.values[index.name] = self._given(said, 1)[0] if said else -math.inf  # that is the first
-        self.values = self._on_indices(self.values)
+        self.indices = self.standing(self.values)
+        self.values |= {index: at for index, (at, _, _) in self.indices.items()}
 
     def _arguments(self, found: Scene, given: Mapping[str, str]) -> list[Term]:
         """What each parameter is given; `values` is filled on the way."""
@@ -154,21 +162,14 @@ class IntegralScene:
                     return name
         return self.parameters[0]
 
-    def ranges(self, values: Mapping[str, float]) -> dict[str, tuple[float, float]]:
-        """The first and the last number of each index, with these values."""
-        found: dict[str, tuple[float, float]] = {}
-        for index in self._indices:
-            low, high = (float(self._compiled(end)(*(values[name] for name in end.params)).value)
+    def standing(self, values: Mapping[str, float]) -> dict[str, Standing]:
+        """Where indices stand with these values: on one of their numbers; on the first where there is none."""
+        known, found = dict(values), dict[str, Standing]()
+        for index in self._indices:  # outer ones first, on which the ends of others may depend
+            low, high = (float(self._compiled(end)(*(known[name] for name in end.params)).value)
                          for end in (index.first, index.last))  # fmt: skip
-            found[index.name] = (low, high)
-        return found
-
-    def _on_indices(self, values: Mapping[str, float]) -> dict[str, float]:
-        """The same values, where indices stand on one of their numbers; on the first where there is none."""
-        found = dict(values)
-        for name in (index.name for index in self._indices):
-            low, high = self.ranges(found)[name]
-            found[name] = max(low, min(float(np.rint(max(found[name], low))), high))
+            at = known[index.name] = max(low, min(float(np.rint(max(known[index.name], low))), high))
+            found[index.name] = at, low, high
         return found
 
     def look(
@@ -178,7 +179,8 @@ class IntegralScene:
         """The integral number `which`, from 0, with these values; `ghost`: the step of what is seen of differences,
         `nodes`: also where it was evaluated. A `quick` one is coarser, and mostly without numbers where these do not
         fit into a frame. Raises PottoError where it has no value."""
-        known, values = self.regions(wrt), self._on_indices(values)
+        known, standing = self.regions(wrt), self.standing(values)
+        values = {**values, **{index: at for index, (at, _, _) in standing.items()}}
         if not 0 <= which < len(known):
             raise wrong_call(f"`{self.name}` has {len(known)} integrals", f"choose one from 1 to {len(known)}")
         key = wrt, which
@@ -193,7 +195,7 @@ class IntegralScene:
             if quick:
                 self._took[key] = self._told[key] - start
         title = f"{self.name}({', '.join(f'{name} = {value:.4g}' for name, value in values.items())})"
-        return Shot(seen, found, title, wrt)
+        return Shot(seen, found, title, wrt, standing)
 
     def _compiled(self, term: Lam) -> TermFunction:
         if term not in self._functions:

@@ -82,6 +82,17 @@ try {
   await settled();
   seen.ground = await page.locator("body").evaluate((body) => getComputedStyle(body).backgroundColor);
   await page.screenshot({ path: join(folder, "view-dark.png"), fullPage: true });
+  // The range of an index may depend on that of another one.
+  await page.locator("#name").selectOption("nested");
+  const index = (name) => page.locator(`input[data-parameter="${name}"]`);
+  await index("j").waitFor();
+  await settled();
+  seen.inner = [await index("j").inputValue(), await index("j").getAttribute("min")];
+  await index("i").focus();
+  await page.keyboard.press("ArrowRight");
+  await page.waitForFunction(() => !busy && !newest && !dragged);
+  seen.innerThen = [await index("j").inputValue(), await index("j").getAttribute("min")];
+  seen.summand = await numbers();
   await page.locator("#name").selectOption("plain");
   await page.locator("#said", { hasText: "no integral" }).waitFor();
   seen.beyond = beyond;

@@ -262,3 +262,21 @@ def test_of_an_integral_in_a_sum_one_summand_is_seen(
     assert numbers.tangent == pytest.approx(tangent, abs=1e-13)  # roundings of a product
     with pytest.raises(PottoError, match="no number `i` to differentiate by"):
         scene.regions("i")
+
+
+def test_an_index_goes_as_far_as_another_one_lets_it() -> None:
+    world = World()
+    scene = IntegralScene(world, world.put("program.po", INDEXED), "nested", {"t": "0.3"})
+    assert scene.indices == {"i": (2, 2, 3), "j": (2, 2, 5)}
+    assert scene.look({"t": 0.3, "i": 3, "j": 2}, "t").indices == {"i": (3, 2, 3), "j": (3, 3, 5)}
+
+
+def test_of_a_definition_that_cannot_be_read_it_is_said_why() -> None:
+    for broken, says in {
+        "def f(t integral [0, 1] [x < t] d(x)": "never closed",
+        "def f(t) integral [0, 1] [x < ] d(x)": "expected an expression after `<`",
+        "def g(t) integral [0, 1] [x < t] * d(x)\ndef f(t) 2*g(t)": "`g` is broken by this; it is needed through `f`",
+    }.items():
+        world = World()
+        with pytest.raises(PottoError, match=says):
+            IntegralScene(world, world.put("program.po", broken + "\n"), "f", {})

@@ -27,6 +27,7 @@ def f(t)
 #> f(0.25)
 def disc(r) integral ([-1, 1], [-1, 1]) [x^2 + y^2 < r^2] d(x, y)
 #> disc(0.7)
+def nested(t) sum i in 2..3 (sum j in i..5 (integral [0, 1] [x < t/(i*j)] d(x)))
 def plain(t) t
 """
 MESH = """
@@ -63,7 +64,7 @@ def asked(address: str, path: str, body: Any, host: str = "") -> Any:
 
 
 def test_a_slider_moves_the_numbers(address: str) -> None:
-    assert asked(address, "/names", {}) == {"names": ["f", "disc", "plain"], "chosen": "f"}
+    assert asked(address, "/names", {}) == {"names": ["f", "disc", "nested", "plain"], "chosen": "f"}
     found = asked(address, "/open", {"name": "f"})
     assert (found["values"], found["wrt"], found["integrals"]) == ({"t": 0.25}, "t", 1)
     for t, e_to_t in ((0.25, 1.2840254166877414), (0.75, 2.117000016612675)):
@@ -173,3 +174,5 @@ def test_a_person_with_a_browser(address: str, tmp_path: Path) -> None:
     assert seen["pinned"][0] == seen["withGhost"][0]
     assert seen["compared"][0].startswith("Δ −") and len(seen["compared"]) == 5
     assert seen["ground"] == "rgb(30, 30, 30)"
+    assert seen["inner"] == ["2", "2"] and seen["innerThen"] == ["3", "3"]
+    assert float(seen["summand"][1].split()[0]) == pytest.approx(1 / 9, rel=1e-9)  # of t/(i*j) by t, with i = j = 3

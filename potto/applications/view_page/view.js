@@ -57,6 +57,7 @@ async function look() {
         const kept = !found.numbers && last?.body.name === name && last.wrt === wrt && last.body.which === which;
         last = { ...found, ...(kept && { told: last.told, numbers: last.numbers, old: true }), title: titleOf(name, body.values), wrt, body };
         show($("now"), last, pinned);
+        stand(found.indices, body.values);
         tell(found, performance.now() - since);
       }
     }
@@ -179,7 +180,7 @@ async function open(name, keep = false, which = 0) {
 function sliders() {
   $("sliders").replaceChildren(...Object.entries(state.values).map(([name, value]) => {
     const reach = Math.max(1, Math.abs(value)), index = state.indices[name];
-    const [min, max, step] = index ? [...index, 1] : [value - reach, value + reach, reach / 500];
+    const [min, max, step] = index ? [index[1], index[2], 1] : [value - reach, value + reach, reach / 500];
     const slider = make("input", { type: "range", min, max, step, value, name });
     const told = make("output", { textContent: String(+value.toPrecision(6)) });
     slider.dataset.parameter = name;
@@ -193,6 +194,17 @@ function sliders() {
     label.dataset.name = name;
     return label;
   }));
+}
+/** Indices stand on their numbers, which other values may have changed; but for one that was dragged on meanwhile. */
+function stand(indices, asked) {
+  state.indices = indices;
+  for (const [name, [at, min, max]] of Object.entries(indices)) {
+    const slider = document.querySelector(`#sliders input[data-parameter="${CSS.escape(name)}"]`);
+    if (!slider || state.values[name] !== asked[name]) continue;
+    state.values[name] = at;
+    Object.assign(slider, { min, max, value: at });
+    slider.nextElementSibling.textContent = String(at);
+  }
 }
 const moves = () => { for (const label of $("sliders").children) label.classList.toggle("moves", label.dataset.name === state.wrt); };
 
