@@ -6,6 +6,7 @@ Answers by closed forms, or by mpmath over lengths that are closed forms.
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from typing import Any
 
 import mpmath as mp
@@ -254,3 +255,42 @@ def test_a_tip_beside_a_short_stretch_is_part_of_the_error() -> None:
     for t in (1e-8, 1e-7, 1e-6):
         answer = f(t)
         assert abs(answer.value - (12 - 8 / 3 * math.sqrt(0.5) - math.pi * t * t)) <= answer.error < 1e-9
+
+
+def test_a_tail_whose_tangent_alone_is_seen() -> None:
+    """At x = t the density's tail beyond y = sin(3 x)/t is 1e-10 and dies out in a hundredth of what follows, its
+    tangent by t is a thousand times larger: the derivative was 3.8e-10 off with 6.4e-11. Expected values are integrals
+    of erf and of its derivatives by Gauss-Legendre rules of 100 nodes, right to 1e-14."""
+    t, nodes = 0.021, np.polynomial.legendre.leggauss(100)
+
+    def over(f: Any, *places: float) -> float:
+        parts = [(a + b + (b - a) * nodes[0], b - a) for a, b in pairwise(places)]
+        return sum(length / 2 * float(nodes[1] @ f(x / 2)) for x, length in parts)
+
+    def density(z: Any) -> Any:
+        return np.exp(-z * z / 2) / math.sqrt(2 * math.pi)
+
+    def beyond(x: float) -> float:  # of cos(x - y) where y > x, by how far x is above t
+        return over(lambda z: density(z) * np.cos(x - z / 2), 2 * x, 2, 5, 12)
+
+    def top(x: Any) -> Any:  # how the probability of y < sin(3 x)/t changes with t, and what that counts
+        s = np.sin(3 * x) / t
+        return (1 + x * x) * density(2 * (s - t)) * 2 * (-s / t - 1)
+
+    def beside(x: Any, sign: int) -> Any:  # the same for y < -r, or y < r, where r^2 = t - x^2
+        r = sign * np.sqrt(t - x * x)
+        return (1 + x * x) * density(2 * (r - t)) * 2 * (0.5 / r - 1)
+
+    def near(s: Any) -> Any:  # between the corner and the end of the circle at x = side, at the end's root
+        x = side - s * s
+        return 2 * s * (beside(x, -1) - beside(x, 1))
+
+    side = math.sqrt(t)
+    corner = float(mp.findroot(lambda x: (mp.sin(3 * x) / t) ** 2 - t + x * x, t**1.5 / 3))
+    under = over(top, -t, -corner) + over(lambda x: beside(x, -1), -corner, corner)
+    under += over(top, corner, t / 2, t, 2 * t, 5 * t, 1) + over(near, 0, math.sqrt(side - t), math.sqrt(side - corner))
+    under += (1 + t * t) * math.erfc(-math.sqrt(2) * (math.sin(-3 * t) / t - t)) / 2  # by the end at -t
+    expected = 2 * (2 * beyond(-2 * t) - beyond(1 - t)) - under
+    body = "2*(if [x <= y] then cos(x - y) else 0) - (if [x^2 + y^2 > t and sin(3*x) > t*y] then 1 + x^2 else 0)"
+    found = derivative(f"def f(t) integral [-t, 1] (integral (y ~ normal(t, 0.5)) ({body}) d(y)) d(x)", t=t)
+    assert abs(found.tangent - expected) <= found.tangent_error <= 2e-10

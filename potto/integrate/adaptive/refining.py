@@ -92,21 +92,23 @@ def integrated(work: PanelBatch) -> Sums:
 
 
 def beside_short_ones(work: PanelBatch, p: Pieces) -> Pieces:
-    """Whole segments, of which those are halved and graded that have missed something next to an end, of which their
-    own errors say too little: what these tell is refined as anything else is. Of the others it is part of the error."""
-    missed = unseen(work, p)
-    if missed is None:
+    """Whole segments, of which those are halved that have missed something next to an end, of which their own errors
+    say too little, and graded where a short neighbour sets its scale: what these tell is refined as anything else is.
+    Of the others it is part of the error."""
+    if not (looked := unseen(work, p)):
         return p
+    (at_left, short_left), (at_right, short_right) = looked
     owner, size = work.seg.owner[p.segment], by_either_form(work, p.size)
     total = np.stack([np.bincount(owner, row, minlength=work.batch)[owner] for row in size])
     known = TOO_LITTLE * np.maximum(p.error, p.floor)
     least = np.maximum(known, COUNTS * np.maximum(work.machine.atol, work.machine.rtol * total))
-    left, right = ((part > least).any(axis=0) for part in missed)
-    p.error = p.error + np.where(left | right, 0.0, missed[0] + missed[1])
+    left, right = ((missed > least).any(axis=0) for missed in (at_left, at_right))
+    p.error = p.error + np.where(left | right, 0.0, at_left + at_right)
     if not (there := left | right).any():
         return p
     halves = halved(p.pick(there))
-    halves.end = np.concatenate((np.where(left[there], -GRADE, 0), np.where(right[there], GRADE, 0)))
+    graded = (left & short_left)[there], (right & short_right)[there]
+    halves.end = np.concatenate((np.where(graded[0], -GRADE, 0), np.where(graded[1], GRADE, 0)))
     return p.pick(~there).join(measured(work, halves, HALF_ORDER))
 
 

@@ -68,6 +68,7 @@ class PanelBatch(Struct, dict=True):
         self.inner = self.machine.with_directions(self.k + 1) if self.moving else self.machine
         with np.errstate(divide="ignore", invalid="ignore"):
             off = np.maximum(self.seg.ea, self.seg.eb) / (self.seg.b - self.seg.a)
+        self.hinted = any(level.peaks for level in self.parent.plan.levels[self.number :])
         self.bends = not self.last and bool((off > UNSURE).any())  # beside cuts, by more than nothing
 
     # Channels: per component the value, then per direction the moving form, then (if both) the fixed form
@@ -268,8 +269,7 @@ class PanelBatch(Struct, dict=True):
 
     def end_values(self) -> Ends | None:
         """F at both ends of every segment, sides as on the segment; None where it is not needed."""
-        hinted = any(level.peaks for level in self.parent.plan.levels[self.number :])
-        if not self.last and not hinted and not (self.moving and self.sweeps()):
+        if not self.last and not self.hinted and not (self.moving and self.sweeps()):
             return None
         seg, frozen, plan = self.seg, self.machine.with_directions(0), self.parent.plan
         names = plan.body.params if self.last else self.env
