@@ -12,6 +12,7 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable, Iterator
+from typing import Any
 
 import numpy as np
 
@@ -121,6 +122,7 @@ def edge() -> None:
 def native() -> None:
     """What it takes to load LLVM and to make machine code, and by how many points it pays."""
     import potto
+    from potto.integrate.fixed.rule_text import RuleText
     from potto.kernels.making import counts
     from potto.kernels.native import objects
 
@@ -139,7 +141,15 @@ def native() -> None:
             spans.append(time.perf_counter() - start)
         return found
 
-    objects.made = timed
+    written, writing = [], RuleText.text
+
+    def text_of(rule: RuleText, places: Any) -> str:
+        start = time.thread_time()
+        found = writing(rule, places)
+        written.append((time.thread_time() - start) / found.count("\n"))
+        return found
+
+    objects.made, RuleText.text = timed, text_of  # type: ignore[method-assign, assignment]
     programs = {
         "1-D, a root": "def f(a) integral [0, 3] exp(-x)*[x*x < a] d(x)",
         "2-D, a line": "def f(a) integral ([0, 1], [0, 1]) 1/(x + y + a)^2*[x + y < a] d(x, y)",
@@ -159,11 +169,12 @@ def native() -> None:
         made, spent = counts.native - made, counts.native_seconds - spent
         print(f"  {name:16} {made} functions, {spent / max(made, 1) * 1e3:5.1f} ms each; "
               f"a member {times[0] * 1e6:.1f} us by numpy, {times[1] * 1e6:.1f} us by machine code")  # fmt: skip
-    objects.made = made_of
+    objects.made, RuleText.text = made_of, writing  # type: ignore[method-assign]
     line, least = np.polyfit(sizes, spans, 1, w=1 / np.array(spans))
     off = np.abs(np.array(spans) / (least + line * np.array(sizes)) - 1)
     print(f"  of {len(sizes)} texts of {min(sizes)} to {max(sizes)} lines: {least * 1e3:.1f} ms and "
-          f"{line * 1e6:.0f} us a line, within {off.max():.0%}, half of them within {np.median(off):.0%}")  # fmt: skip
+          f"{line * 1e6:.0f} us a line, within {off.max():.0%}, half of them within {np.median(off):.0%}; "
+          f"to write one {np.median(written) * 1e6:.0f} us a line")  # fmt: skip
 
 
 def elementary() -> None:

@@ -62,7 +62,7 @@ def test_numpy_goes_on_where_llvm_fails(monkeypatch: pytest.MonkeyPatch) -> None
         raise RuntimeError("LLVM knows no such processor")
 
     monkeypatch.setattr(objects, "made", failing)
-    for cost in ("LLVM", "LEAST", "LINE"):
+    for cost in ("LLVM", "LEAST", "LINE", "WRITTEN"):
         monkeypatch.setattr(promotion, cost, 0.0)
     d, before = 2.03125, counts.native_points
     text = TEXT.replace("2)", f"{d})").replace("x + y + c", "x + y + c + 0.25")  # nor has any met where this is cut

@@ -31,6 +31,8 @@ MEMBERS, POINTS = 1 << 16, 1 << 15
 # How many members tell the order for all, where there are many, and for how many of them it must do.
 PILOTS = 16
 ENOUGH = 0.9
+# The one whose coefficients tell of those before as well, and the first one that few cells get.
+PROBE = 2
 # What rounding may leave where what is added up cancels, as a part of that, in the end (`convergence`): of 18,233 pairs
 # of a triangle and a pixel 1,082 would be done again for less, at a hundred times the cost.
 ROUNDED = 1e-12
@@ -166,9 +168,12 @@ def _tried(
     if all(known):
         return tried[:1]
     if todo.size <= FEW:
-        return tried[2:]
+        return tried[PROBE:]
     few = todo[:: max(1, todo.size // PILOTS)]
-    for number, rule in enumerate(tried[:-1]):
-        if rule.good(rule.applied(env, few)).mean() >= ENOUGH:
+    first = tried[: PROBE + 1]
+    foreseen = first[-1].foreseen(env, few, first)
+    later = (rule.good(rule.applied(env, few)) for rule in tried[PROBE + 1 : -1])
+    for number, good in enumerate(itertools.chain(foreseen, later)):
+        if good.mean() >= ENOUGH:
             return tried[number:]
     return tried[-1:]

@@ -16,7 +16,7 @@ from msgspec import Struct
 from numpy.typing import NDArray
 
 from potto.core.terms import Term
-from potto.integrate.fixed.axes import MEAN, Axis
+from potto.integrate.fixed.axes import MEAN, Axis, axis
 from potto.integrate.fixed.lowered import LoweredCells, frame_of, lowered_cells
 from potto.integrate.fixed.moving_sums import SUMMED, Totals, summed
 from potto.integrate.fixed.product_rule import ELSEWHERE, TRACKED
@@ -171,5 +171,5 @@ def _face(plan: Straight, region: Region, machine: Evaluator, env: Mapping[str, 
     cells, orders = zip(*own, strict=True)
     every = max(orders), *region.inner
     nodes = len(cells) * math.prod(every)
-    axes = tuple(Axis.of(order, MEAN, (False, False), nodes > TRACKED) for order in every)
+    axes = tuple(axis(order, MEAN, (False, False), nodes > TRACKED) for order in every)
     return Face(lowered_cells(plan, body, machine.directions, env), cells, axes, 1 + machine.directions, nodes)

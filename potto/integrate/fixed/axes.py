@@ -1,12 +1,13 @@
 """The nodes of product rules along each variable, and what comes of cells at them.
 
-Owns `Axis` and `Raw`, which the ways to work out a rule (`nodes`, `lowered`) share.
+Owns `Axis`, `axis` and `Raw`, which the ways to work out a rule (`nodes`, `lowered`) share.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 from msgspec import Struct
@@ -19,8 +20,8 @@ MEAN = (0,)  # the coefficient that is enough where a rule is exact
 ENDS = 2  # of a stretch, behind those nodes at which rounding is followed
 
 
-class Axis(Struct, frozen=True):
-    """Nodes of a variable on [0, 1].
+class Axis(Struct, frozen=True, eq=False):
+    """Nodes of a variable on [0, 1]; what machine code is told of them is found by the axis itself (`lowered`).
 
     speeds: how fast they run, as they crowd at turning points, where roots are. transform: (n, rows) from numbers at
     the nodes to the Legendre coefficients that are asked for, the first of which is the mean. few, few_speeds: those
@@ -34,25 +35,26 @@ class Axis(Struct, frozen=True):
     few: Array
     few_speeds: Array
 
-    @classmethod
-    def of(cls, order: int, asked: Sequence[int], turning: tuple[bool, bool], several: bool) -> Axis:
-        """asked: the numbers of coefficients. turning: whether an end of the stretch is like a square root. several:
-        rounding is followed at few nodes."""
-        rule = gauss(order)
-        u = rule.nodes
-        match turning:
-            case (True, True):
-                nodes, speeds = np.sin(0.5 * math.pi * u) ** 2, 0.5 * math.pi * np.sin(math.pi * u)
-            case (True, False):
-                nodes, speeds = u * u, 2 * u
-            case (False, True):
-                nodes, speeds = u * (2 - u), 2 * (1 - u)
-            case _:
-                nodes, speeds = u, np.ones_like(u)
-        picked = distinct([0, order // 2, order - 1]) if several else np.arange(order)
-        transform = np.ascontiguousarray(rule.transform[:, asked])
-        few, few_speeds = np.append(nodes[picked], (0.0, 1.0)), np.append(speeds[picked], _at_ends(turning))
-        return cls(nodes, speeds, rule.weights, transform, few, few_speeds)
+
+@lru_cache(maxsize=512)
+def axis(order: int, asked: tuple[int, ...], turning: tuple[bool, bool], several: bool) -> Axis:
+    """The nodes of a Gauss rule. asked: the numbers of coefficients. turning: whether an end of the stretch is like a
+    square root. several: rounding is followed at few nodes."""
+    rule = gauss(order)
+    u = rule.nodes
+    match turning:
+        case (True, True):
+            nodes, speeds = np.sin(0.5 * math.pi * u) ** 2, 0.5 * math.pi * np.sin(math.pi * u)
+        case (True, False):
+            nodes, speeds = u * u, 2 * u
+        case (False, True):
+            nodes, speeds = u * (2 - u), 2 * (1 - u)
+        case _:
+            nodes, speeds = u, np.ones_like(u)
+    picked = distinct([0, order // 2, order - 1]) if several else np.arange(order)
+    transform = np.ascontiguousarray(rule.transform[:, asked])
+    few, few_speeds = np.append(nodes[picked], (0.0, 1.0)), np.append(speeds[picked], _at_ends(turning))
+    return Axis(nodes, speeds, rule.weights, transform, few, few_speeds)
 
 
 def _at_ends(turning: tuple[bool, bool]) -> Sequence[float]:

@@ -10,13 +10,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from msgspec import Struct, field
+from msgspec import Struct
 from numpy.typing import NDArray
 
-from potto.core.terms import Term
+from potto.core.terms import Term, postorder
 from potto.integrate.fixed.axes import Axis, Raw
 from potto.integrate.fixed.formula_text import ONE, Place
 from potto.integrate.fixed.rule_text import NAME, RuleText
@@ -30,6 +31,10 @@ from potto.kernels.native.promotion import Promotion
 from potto.kernels.native.straight import Part
 from potto.kernels.native.vectors import LANES
 
+# Lines of a function's text at the least: in all, and for each term and for its tangent along each direction. There
+# are up to twice as many.
+LINES, LINES_OF_A_TERM = 400, 3
+
 
 class LoweredCells(Struct, frozen=True):
     """The rule for cells of one integrand with any number of nodes, for parameters with these parts."""
@@ -37,7 +42,7 @@ class LoweredCells(Struct, frozen=True):
     plan: Straight
     face: Term
     places: tuple[Place, ...]
-    promotion: Promotion = field(default_factory=lambda: Promotion(NAME))
+    promotion: Promotion
 
     def function(self, machine: Evaluator) -> Loaded | None:
         """The function, if it is to be used now."""
@@ -73,8 +78,14 @@ def lowered_cells(plan: Straight, face: Term, directions: int, env: Mapping[str,
     key = (face, directions, places)
     found: LoweredCells | None = plan.lowered.get(key)
     if found is None:
-        found = plan.lowered[key] = LoweredCells(plan, face, places)
+        lines = LINES + LINES_OF_A_TERM * terms_of(plan, face) * (1 + directions)
+        found = plan.lowered[key] = LoweredCells(plan, face, places, Promotion(NAME, lines))
     return found
+
+
+def terms_of(plan: Straight, face: Term) -> int:
+    """How many terms such a rule works out."""
+    return sum(len(postorder(term)) for term in (face, *(frame.body for frame in plan.frames)))
 
 
 def frame_of(out: Array, axes: Sequence[Axis], columns: Sequence[NDArray[Any]]) -> Ints:
@@ -111,6 +122,7 @@ def _kind(part: Part, x: Any) -> str:
     return "array" if isinstance(x, np.ndarray) else ONE if part.kind == "t" and x == 1.0 else "number"
 
 
+@lru_cache(maxsize=512)
 def _told(axis: Axis) -> list[int]:
     """What the function is told of a variable's nodes."""
     tables = (axis.nodes, axis.speeds, axis.weights, axis.transform, axis.few, axis.few_speeds)

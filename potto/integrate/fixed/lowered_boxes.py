@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from msgspec import Struct, field
 
-from potto.integrate.fixed.axes import Axis
+from potto.integrate.fixed.axes import axis
 from potto.integrate.fixed.box_text import CROSSED, DARK, DONE, LEFT, BoxText, Look, numbers, rows_of
 from potto.integrate.fixed.formula_text import Place
 from potto.integrate.fixed.lowered import frame_of, given, parts, whole
@@ -74,7 +74,7 @@ class LoweredBoxes(Struct, frozen=True):
         m, k1 = numbers(self.look.faces[0][0]) if self.look.faces else 1, 1 + machine.directions
         constants, arrays = given(self.places, env)
         constants = np.concatenate(([0.5 * machine.rtol, 0.5 * machine.atol], constants))
-        axes = [Axis.of(order, range(order), (False, False), True) for order in self.orders]
+        axes = [axis(order, tuple(range(order)), (False, False), True) for order in self.orders]
         least = max(batch, LANES)
         out = np.empty((rows_of(m * k1), least))
         columns = [whole(column, least) for column in (*arrays, *sides)]

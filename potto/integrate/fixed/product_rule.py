@@ -7,11 +7,12 @@ follows from it is said here.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from msgspec import Struct
 
-from potto.integrate.fixed.axes import MEAN, Axis, Raw
+from potto.integrate.fixed.axes import MEAN, Raw, axis
 from potto.integrate.fixed.lowered import LoweredCells, lowered_cells
 from potto.integrate.fixed.moving_sums import SUMMED
 from potto.integrate.fixed.nodes import at_once
@@ -78,29 +79,41 @@ class Rule(Struct, frozen=True):
 
     def applied(self, env: dict[str, Value], index: Ints) -> Measured:
         """The integrals over some of the cells."""
-        self.machine.count(index.size * self.nodes)
-        several = index.size * self.nodes > TRACKED
-        turning = [STRAIGHT if exact else ends for exact, ends in zip(self.exact, self.cell.turning, strict=True)]
-        given = zip(self.orders, self.asked, turning, strict=True)
-        axes = [Axis.of(order, asked, ends, several) for order, asked, ends in given]
-        raw = self.raw(env, index, axes)
-        truncated = np.zeros(raw.number.shape) if self.beyond is None else self.beyond.take(index, 1)
-        for order, exact, sizes in zip(self.orders, self.exact, raw.coefficients, strict=True):
-            if not exact:
-                truncated += analytic_truncation(sizes, order)
-        clear = raw.clear if all(self.exact) else raw.clear & ~(raw.corners > PEAK * raw.largest)
-        truncated[:, ~clear] = np.inf
-        gross = np.maximum(raw.most, np.abs(raw.number))
-        rounding = (ELSEWHERE if several else 1.0) * raw.off + ELSEWHERE * SUMMED * gross
-        return Measured(raw.number, truncated, rounding, gross)
+        return self._measured(self._raw(env, index, self.asked), index, self.orders)
 
-    def raw(self, env: dict[str, Value], index: Ints, axes: list[Axis]) -> Raw:
+    def foreseen(self, env: dict[str, Value], index: Ints, others: Sequence[Rule]) -> list[Bools]:
+        """For which cells rules with no more nodes than this one would do, by its coefficients."""
+        every = zip(self.orders, self.exact, strict=True)
+        raw = self._raw(env, index, [MEAN if exact else tuple(range(order)) for order, exact in every])
+        return [other.good(self._measured(raw, index, other.orders)) for other in others]
+
+    def _raw(self, env: dict[str, Value], index: Ints, asked: Sequence[tuple[int, ...]]) -> Raw:
+        self.machine.count(index.size * self.nodes)
+        turning = [STRAIGHT if exact else ends for exact, ends in zip(self.exact, self.cell.turning, strict=True)]
+        given, several = zip(self.orders, asked, turning, strict=True), self._several(index)
+        axes = [axis(order, own, ends, several) for order, own, ends in given]
         way, members, rows = self.lowered(env), self.cell.members.take(index), self.cell.rows.take(index, -1)
         function = way.function(self.machine)
         if function is not None:
             return way.run(function, env, members, rows, axes, self.machine.directions)
         with way.promotion.by_numpy():
             return at_once(self.plan, self.cell.face, self.machine, env, members, rows, axes)
+
+    def _several(self, index: Ints) -> bool:
+        """Whether there are so many nodes that rounding is followed at few of them."""
+        return index.size * self.nodes > TRACKED
+
+    def _measured(self, raw: Raw, index: Ints, orders: tuple[int, ...]) -> Measured:
+        """What the first coefficients tell, as many as these orders have."""
+        truncated = np.zeros(raw.number.shape) if self.beyond is None else self.beyond.take(index, 1)
+        for most, order, exact, sizes in zip(self.orders, orders, self.exact, raw.coefficients, strict=True):
+            if not exact:
+                truncated += analytic_truncation(sizes[..., : sizes.shape[-1] - most + order], order)
+        clear = raw.clear if all(self.exact) else raw.clear & ~(raw.corners > PEAK * raw.largest)
+        truncated[:, ~clear] = np.inf
+        gross = np.maximum(raw.most, np.abs(raw.number))
+        rounding = (ELSEWHERE if self._several(index) else 1.0) * raw.off + ELSEWHERE * SUMMED * gross
+        return Measured(raw.number, truncated, rounding, gross)
 
     def good(self, found: Measured) -> Bools:
         """For which cells the rule does."""

@@ -1,8 +1,8 @@
 """When machine code takes over from numpy: once numpy has taken as long as making it is expected to.
 
-Owns `Promotion`. First answers never wait: the text is written when the least function would pay, LLVM works on it in a
-thread of its own once this one does, as long as it is, and numpy goes on until that is done. Who rents for as long as
-buying costs, and then buys, pays at most twice the least.
+Owns `Promotion` and `settle`. First answers never wait: the text is written when the least function that it may be
+would pay, LLVM works on it in a thread of its own once this one does, as long as it is, and numpy goes on until that is
+done. Who rents for as long as buying costs, and then buys, pays at most twice the least.
 """
 
 from __future__ import annotations
@@ -22,18 +22,20 @@ if TYPE_CHECKING:
     from concurrent.futures import Future, ThreadPoolExecutor
 
 # Seconds, as `benchmarks/calibration.py native` measures them: the loading of LLVM, once in a process; a function of
-# machine code at the least, and what each line of its text adds.
-LLVM, LEAST, LINE = 0.15, 0.003, 22e-6
+# machine code at the least, and what each line of its text adds; and what it takes to write one, which who asks waits
+# for.
+LLVM, LEAST, LINE, WRITTEN = 0.15, 0.003, 22e-6, 13e-6
 
 
 class Promotion:
-    """A function of machine code: not asked for yet, on its way, ready, or impossible. name: of it in its text."""
+    """A function of machine code: not asked for yet, on its way, ready, or impossible. name: of it in its text, which
+    has so many lines at the least."""
 
-    def __init__(self, name: str) -> None:
+    def __init__(self, name: str, lines: int = 0) -> None:
         self.name = name
         self.spent = 0.0
         self.impossible = False
-        self._cost = LEAST
+        self._cost = LEAST + (LINE + WRITTEN) * lines
         self._text: str | None = None
         self._ready: objects.Loaded | None = None
         self._coming: Future[objects.Loaded] | None = None
@@ -54,10 +56,11 @@ class Promotion:
 
     @contextmanager
     def by_numpy(self) -> Iterator[None]:
-        """Count the time of the block as that of numpy: the processor's, whoever else is using it."""
-        start = time.thread_time()
+        """Count the time of the block as that of numpy: the processor's, whoever else is using it. Kernels that are
+        made in it are made once."""
+        start, making = time.thread_time(), counts.kernel_seconds
         yield
-        self.spent += time.thread_time() - start
+        self.spent += max(time.thread_time() - start - (counts.kernel_seconds - making), 0.0)
 
     def _pays(self) -> bool:
         """Whether numpy has taken as long as machine code would; until its text is written, as the least would."""
@@ -87,6 +90,12 @@ class Promotion:
             self._coming = _worker(os.getpid()).submit(_made, written, self.name)
             self._text = None
         return self._coming
+
+
+def settle() -> None:
+    """Wait until nothing is being compiled (for measurements: whatever else was asked for is no part of them)."""
+    if _worker.cache_info().currsize:
+        _worker(os.getpid()).submit(int).result()
 
 
 def _made(text: str, name: str) -> objects.Loaded:
