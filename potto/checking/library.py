@@ -96,6 +96,11 @@ class Library:
         self.projects.forget()
         return bool(self.files.refresh())
 
+    def stands(self, key: str) -> bool:
+        """Whether all that is known rests on the text of one pseudo file, and on a project file that is as it was."""
+        inputs = set(self.db.input_keys())
+        return inputs <= {("roots",), ("overlay", key)} and Projects().of(key) == self.project(key)
+
     def source(self, file: str) -> SourceText | None:
         """The text of a file."""
         return source(self.db, file)

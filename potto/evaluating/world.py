@@ -55,8 +55,20 @@ class World(Library):
 
     def __init__(self, roots: Sequence[str | os.PathLike[str]] = ()) -> None:
         super().__init__(roots)
+        self._start()
+
+    def _start(self) -> None:
+        self._first = self
         self._local = threading.local()
         self._held: dict[tuple[str, str], Value] = {}
+
+    def again(self) -> World:
+        """A world of the same texts, in which nothing was evaluated yet. By their keys this one goes on to own them."""
+        other = World.__new__(World)
+        other.db, other.files, other.projects = self.db, self.files, self.projects
+        other._start()
+        other._first = self
+        return other
 
     # Evaluating
 
@@ -94,7 +106,7 @@ class World(Library):
         only one that holds it. None where that is not known: what is under an integral has been rewritten."""
         found = []
         for file, name in definitions:
-            if (_owners.get(file, self)) is self:
+            if self._owns(file):
                 place = self._narrowest(core(self.db, file, name).origins, met[0])
                 if place is not None:
                     found.append((file, name, place))
@@ -118,7 +130,7 @@ class World(Library):
         found: dict[tuple[str, str], Term] = {}
         with self.db.evaluating():
             for file, name in definitions:
-                known = parameter_types(interface(self.db, file, name).type) if _owners.get(file, self) is self else {}
+                known = parameter_types(interface(self.db, file, name).type) if self._owns(file) else {}
                 if known.keys() & wanted or not wanted:
                     found[file, name] = named_fields(self.db, term, known)
         inner = {named for key, named in found.items() if term in postorder(definitions[key])}
@@ -129,6 +141,10 @@ class World(Library):
         """Let a definition have this value, with its error, from now on: its term is not evaluated again."""
         self._held[file, name] = value
 
+    def _owns(self, file: str) -> bool:
+        """Whether a file is one of these programs, and no text of a world whose functions came as arguments."""
+        return _owners.get(file, self).db is self.db
+
     def own(self, key: str, text: str) -> str:
         """Give a pseudo file its text, for this world and for those that its functions are given to."""
         _owners[key] = self
@@ -137,7 +153,7 @@ class World(Library):
     def lookup(self, file: str, name: str) -> Term:
         """The term of a definition. Raises ProgramError if it has errors."""
         owner = _owners.get(file, self)
-        if owner is not self:
+        if owner.db is not self.db:
             return owner.lookup(file, name)
         with self.db.evaluating():
             found = definition_diagnostics(self.db, file, name)

@@ -38,6 +38,10 @@ NOWHERE = Span(0, 0)
 Given = tuple[tuple[tuple[Any, ...], dict[str, Any]], ...]  # per call the arguments by place and by name
 NOTHING: Mapping[str, Any] = MappingProxyType({})
 _texts = itertools.count(1)
+# Modules of texts that import nothing, by folder, name and text: what a cell of a notebook that is run again need not
+# be checked for again.
+MOST_KNOWN = 32
+_known: dict[tuple[str, str | None, str], Module] = {}
 
 
 class Workspace:
@@ -92,7 +96,17 @@ def load(path: str | os.PathLike[str]) -> Module:
 
 def compile(text: str, name: str | None = None) -> Module:
     """A module from text: `potto.compile("def f(t) integral [0, 1] [x < t] d(x)")`. Raises as `load` does."""
-    return _compile(World(["."]), os.path.join(os.getcwd(), f"<{name or f'text {next(_texts)}'}>"), text)
+    folder = os.getcwd()
+    known = _known.get((folder, name, text)) if isinstance(text, str) else None
+    if known is not None and known._world.stands(known._file):
+        return _module(known._world.again(), known._file, 3)
+    found = _compile(World(["."]), os.path.join(folder, f"<{name or f'text {next(_texts)}'}>"), text)
+    if found._world.stands(found._file):
+        if len(_known) >= MOST_KNOWN:
+            _known.clear()
+        _known[folder, name, text] = found
+        return Module(found._world.again(), found._file)  # what it evaluates goes with it
+    return found
 
 
 def _load(world: World, path: str) -> Module:

@@ -206,6 +206,31 @@ def test_load_and_compile(tmp_path: Path) -> None:
 # Settings
 
 
+def test_a_text_that_was_compiled_before_is_not_checked_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    text = "def half(t) integral [0, 1] [x < t]*0.5 d(x)\ndef twice(f) 2*f(0.5)"
+    first = potto.compile(text)
+    assert first.half(0.25).value == 0.125
+    second = potto.compile(text)
+    with second._world.db.recording() as events:
+        assert second.half(0.25).value == 0.125
+        assert potto.compile(text).twice(first.half).value == 0.5
+    assert not [e for e in events if e.kind == "executed" and e.query in ("parsed", "check_definition")]
+    assert second._world.program is not first._world.program  # what it evaluates is its own
+    del first
+    assert second.twice(potto.compile("def g(t) t").g).value == 1.0
+
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "part.po").write_text("a = 1\n")
+    importing = "from part import a\ndef f(t) a*t"
+    assert potto.compile(importing).f(2.0).value == 2.0
+    (tmp_path / "part.po").write_text("a = 30\n")
+    assert potto.compile(importing).f(2.0).value == 60.0  # what is on disk may be another text by now
+
+    assert potto.compile(text).half(0.25).converged
+    (tmp_path / "potto.toml").write_text('[settings]\nmethod = "mc"\n')
+    assert "mc" in potto.compile(text).half(0.25).method  # and the project another one
+
+
 def test_settings_hold_inside_their_block(renderer: Any, shader: Any) -> None:
     with potto.settings(method="mc", samples=2_000, seed=7):
         first, second = renderer(-0.7, shader), renderer(-0.7, shader)
