@@ -19,7 +19,8 @@ from potto.kernels.cells import Array
 from potto.kernels.errors import wrong_call
 from potto.python.arrays import axes_of
 from potto.python.functions import Function, component, must_be_function
-from potto.python.gradients import Names, parameters_to_vary, value_and_jacobian
+from potto.python.gradients import value_and_jacobian
+from potto.python.named_parameters import Names, parameters_to_vary
 from potto.types import format_type
 from potto.types.types import ArrayOf, Dist, Parameter, Real, TupleOf, Type, Var, groups_of, resolve, result_of
 

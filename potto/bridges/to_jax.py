@@ -17,7 +17,7 @@ from potto.bridges.flat import Flat, Leaf, Shapes
 from potto.extras import install_command
 from potto.kernels.errors import wrong_call
 from potto.python.functions import Function
-from potto.python.gradients import Names
+from potto.python.named_parameters import Names
 from potto.python.remade import remade
 
 Sizes = tuple[Shapes, Shapes]

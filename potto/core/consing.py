@@ -32,7 +32,7 @@ class Base(Struct, frozen=True, eq=False, weakref=True):
         return f"<{type(self).__name__} {format_term(self, 200)}>"  # type: ignore[arg-type]
 
     def __reduce__(self) -> Any:
-        from potto.core.kinds import rebuilt
+        from potto.core.rebuilding import rebuilt
 
         return rebuilt, (type(self), tuple(getattr(self, name) for name in own_fields(type(self))))
 

@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from itertools import pairwise
-from typing import Any
 
 from potto.core.consing import Base, made, make
 
@@ -224,10 +223,6 @@ def union_of(terms: Iterable[Term]) -> frozenset[str]:
     return result
 
 
-def rebuilt(cls: type, fields: tuple[Any, ...]) -> Any:
-    return _REBUILD[cls](*fields)
-
-
 # Constructors, one for each kind of term
 
 
@@ -372,34 +367,6 @@ def deriv(function: Term) -> Deriv:
 def hole(reason: str, measure: bool = False) -> Hole:
     return make(Hole, _NOTHING, reason, measure)
 
-
-def _prim_from(op: str, args: tuple[Term, ...]) -> Prim:
-    return prim(op, *args)
-
-
-_REBUILD: dict[type, Any] = {
-    Const: const,
-    Var: var,
-    Prim: _prim_from,
-    If: if_,
-    Branch: branch,
-    Tuple: tuple_,
-    Proj: proj,
-    ListOf: list_of,
-    Array: array,
-    Index: index,
-    Length: length,
-    Data: data,
-    Lam: lam,
-    App: app,
-    Global: global_,
-    Integral: integral,
-    Delta: delta,
-    Sum: sum_,
-    Fold: fold,
-    Deriv: deriv,
-    Hole: hole,
-}
 
 ZERO = const(0.0)
 ONE = const(1.0)

@@ -19,7 +19,7 @@ from msgspec import Struct, msgpack
 
 from potto import store
 from potto.core.consing import Base, own_fields
-from potto.core.kinds import rebuilt
+from potto.core.rebuilding import rebuilt
 from potto.core.walking import unknown
 from potto.diagnostics import KINDS, Kind
 

@@ -11,8 +11,6 @@ import marshal
 from collections.abc import Sequence
 from typing import Any, Protocol
 
-from msgspec import Struct
-
 from potto.calculus.surfaces.trace import CallSite, Layout, immediate, integrating, is_lazy, layout
 from potto.core.terms import (
     App,
@@ -43,6 +41,7 @@ from potto.core.terms import (
 from potto.kernels.cells import Cell, Pattern, Trace, Value
 from potto.kernels.emit import ZERO, Lines, Scalar
 from potto.kernels.kinks import watched
+from potto.kernels.known import Dynamic, Known, Structure, is_inexact, moves
 from potto.kernels.taping import TapeLines
 from potto.kernels.written import Written
 
@@ -75,24 +74,6 @@ class Runtime(Protocol):
     def project(self, value: Value, index: int) -> Value: ...
     def term(self, term: Term, env: dict[str, Value]) -> Value: ...
     def fail(self, term: Hole | Delta) -> Value: ...
-
-
-class Structure(Struct, frozen=True):
-    """A tuple or a list whose parts are known while compiling."""
-
-    parts: tuple[Known, ...]
-    is_list: bool
-
-
-class Dynamic(Struct, frozen=True):
-    """A value whose kind is known only at run time: the variable that holds it and what it may carry."""
-
-    name: str
-    inexact: bool
-    moves: tuple[bool, ...]
-
-
-Known = Scalar | Structure | Dynamic
 
 
 class Writer:
@@ -256,7 +237,7 @@ class Writer:
         return Dynamic(self.out.let(expression, "d"), inexact or self.out.rounding, self.moves(movers))
 
     def moves(self, movers: tuple[Known, ...]) -> tuple[bool, ...]:
-        return tuple(any(_moves(m, d) for m in movers) for d in range(self.directions))
+        return tuple(any(moves(m, d) for m in movers) for d in range(self.directions))
 
     def environment(self, names: frozenset[str]) -> tuple[str, tuple[Known, ...]]:
         """A dict display of free variables, and what they are."""
@@ -295,7 +276,7 @@ class Writer:
         if isinstance(a, Scalar) and isinstance(b, Scalar):
             return self.out.select(mask, a, b)
         select = self.out.ufunc("support.select_value")
-        inexact = _inexact(a) or _inexact(b)
+        inexact = is_inexact(a) or is_inexact(b)
         return self.dynamic(f"{select}({mask}, {self.pack(a)}, {self.pack(b)})", inexact, (a, b))
 
     def lazy(self, term: If | Branch) -> Known:
@@ -312,11 +293,11 @@ class Writer:
         known = self.known(term.term)
         if isinstance(known, Structure) and term.index < len(known.parts):
             return known.parts[term.index]
-        return self.dynamic(f"rt.project({self.pack(known)}, {term.index})", _inexact(known), (known,))
+        return self.dynamic(f"rt.project({self.pack(known)}, {term.index})", is_inexact(known), (known,))
 
     def closure(self, term: Lam) -> Known:
         env, known = self.environment(term.free)
-        inexact = self.rt.inexact(term) or any(map(_inexact, known))
+        inexact = self.rt.inexact(term) or any(map(is_inexact, known))
         return self.dynamic(f"rt.closure({self.keep(term)}, {env})", inexact, known)
 
     def call(self, site: object) -> Known:
@@ -326,7 +307,7 @@ class Writer:
         packed = "".join("(" + "".join(f"{self.pack(a)}, " for a in group) + "), " for group in groups)
         movers = (head, *(a for group in groups for a in group))
         trace = self.trace(site.call, 0)
-        return self.dynamic(f"rt.call({self.pack(head)}, ({packed}), {trace})", any(map(_inexact, movers)), movers)
+        return self.dynamic(f"rt.call({self.pack(head)}, ({packed}), {trace})", any(map(is_inexact, movers)), movers)
 
     def global_(self, term: Global) -> Known:
         name = self.out.let(f"rt.global_value({term.module!r}, {term.name!r})", "g")
@@ -341,7 +322,7 @@ class Writer:
         elif function is None:
             env, known = self.environment(inner.free)
             function = self.dynamic(f"rt.term({self.keep(inner)}, {env})", True, known)
-        return self.dynamic(f"rt.derived({self.pack(function)})", _inexact(function), (function,))
+        return self.dynamic(f"rt.derived({self.pack(function)})", is_inexact(function), (function,))
 
     def integral(self, term: Integral) -> Known:
         env, known = self.environment(term.free)
@@ -354,7 +335,7 @@ class Writer:
     def sum(self, term: Sum) -> Known:
         env, known = self.environment(term.body.free - {term.variable})
         lo, hi = self.pack(self.known(term.lo)), self.pack(self.known(term.hi))
-        inexact = self.out.rounding or self.rt.inexact(term.body) or any(map(_inexact, known))
+        inexact = self.out.rounding or self.rt.inexact(term.body) or any(map(is_inexact, known))
         text = f"rt.sum({self.keep(term)}, {lo}, {hi}, {env}, {self.trace(term, 0)})"
         return self.dynamic(text, inexact, known)
 
@@ -368,14 +349,14 @@ class Writer:
         match term:
             case Array():
                 env, known = self.environment(term.body.free - {term.variable})
-                inexact = self.rt.inexact(term.body) or any(map(_inexact, known))
+                inexact = self.rt.inexact(term.body) or any(map(is_inexact, known))
                 return self.dynamic(
                     f"rt.array({self.keep(term)}, {self.pack(self.known(term.size))}, {env})", inexact, known
                 )
             case Index():
                 array, place = self.known(term.array), self.known(term.index)
                 text = f"rt.index({self.keep(term)}, {self.pack(array)}, {self.pack(place)})"
-                return self.dynamic(text, _inexact(array), (array,))
+                return self.dynamic(text, is_inexact(array), (array,))
             case Length():
                 like = "None" if term.like is None else self.pack(self.known(term.like))
                 text = f"rt.length({self.keep(term)}, {self.pack(self.known(term.array))}, {like})"
@@ -388,17 +369,3 @@ def _at_once(term: Term) -> tuple[Term, ...]:
     """The children that come before a term itself; summands that integrate are evaluated together."""
     together = integrating(term) if isinstance(term, Prim) else ()
     return tuple(part for part in immediate(term) if part not in together)
-
-
-def _inexact(known: Known) -> bool:
-    if isinstance(known, Structure):
-        return any(map(_inexact, known.parts))
-    return known.inexact if isinstance(known, Dynamic) else not known.exact
-
-
-def _moves(known: Known, direction: int) -> bool:
-    if isinstance(known, Structure):
-        return any(_moves(p, direction) for p in known.parts)
-    if isinstance(known, Dynamic):
-        return known.moves[direction]
-    return known.t[direction] is not None

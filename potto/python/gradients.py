@@ -8,7 +8,6 @@ are in `applications/hessian`.
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, overload
 
@@ -25,8 +24,9 @@ from potto.python.arguments import Batch, value_of
 from potto.python.calls import Call
 from potto.python.described import typeset_derivative
 from potto.python.forms import as_matrix, bounds_of, by_name, in_lists, must_match, tangents_of, weighted
-from potto.python.functions import Function, bound, must_be_function
+from potto.python.functions import Function, bound
 from potto.python.moving import each_moving, moved, own, size, with_own, with_places
+from potto.python.named_parameters import Names, parameters_to_vary
 from potto.python.remade import remade
 from potto.python.sided import with_sides
 from potto.runtime.answers.estimate import Estimate
@@ -44,7 +44,6 @@ from potto.types.types import REAL
 MANY = 12
 SWEEP = 6  # tangents that cost what a sweep does, of which each number of an answer takes one
 NOTHING: Swept = (None, None)
-Names = Sequence[str] | str | None
 
 
 class Gradient(Estimate, frozen=True, eq=False):
@@ -227,28 +226,6 @@ def in_given_form(found: Gradient, function: Function, args: tuple[Any, ...], kw
         return tuple(each) if len(each) > 1 else each[0]
 
     return replace(found, tangent=form(found.tangent), tangent_error=form(found.tangent_error))
-
-
-def parameters_to_vary(function: Function, wrt: Names) -> tuple[str, ...]:
-    """The names in `wrt`, each once, or that of the first parameter. Raises PottoError if they are none of them."""
-    must_be_function(function)
-    parameters = function.parameters
-    if wrt is None:
-        if not parameters or not parameters[0]:
-            raise wrong_call("the first parameter has no name, and derivatives are taken by names")
-        return parameters[:1]
-    if not isinstance(wrt, str | Sequence) or not all(isinstance(name, str) for name in wrt):
-        raise wrong_call(f"`wrt` takes the names of parameters, not {wrt!r}")
-    names = (wrt,) if isinstance(wrt, str) else tuple(dict.fromkeys(wrt))
-    if not names:
-        raise wrong_call("`wrt` names no parameter to differentiate by")
-    for name in names:
-        if name not in parameters:
-            near = difflib.get_close_matches(name, [p for p in parameters if p], 1)
-            named = ", ".join(f"`{p}`" for p in parameters if p)
-            hint = f"did you mean `{near[0]}`?" if near else f"its parameters are {named}" if named else ""
-            raise wrong_call(f"`{function.written}` has no parameter `{name}`", hint)
-    return names
 
 
 class _Run:
