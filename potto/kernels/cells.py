@@ -206,9 +206,11 @@ def pattern(value: Value, directions: int) -> Pattern:
     A cell gives (has an error, per direction 0 none, 1 one, 2 any other tangent); structure is mirrored.
     """
     if isinstance(value, Cell):
+        if not value.t:  # as most do not move
+            return (value.e is not None, (0,) * directions)
         tangents = [0 if x is None else 1 if x.__class__ is float and x == 1.0 else 2 for x in value.t]
         inexact = value.e is not None or bool([True for x in value.et if x is not None])
-        return (inexact, tuple(tangents) or (0,) * directions)
+        return (inexact, tuple(tangents))
     if isinstance(value, tuple):
         return ("tuple", *(pattern(item, directions) for item in value))
     if isinstance(value, Rows):

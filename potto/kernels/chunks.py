@@ -36,11 +36,15 @@ def many(args: list[Value]) -> bool:
 
 def at_points(kernel: Kernel, rt: Runtime, trace: Trace | None, args: list[Value], backend: str) -> Value:
     """The value of a kernel that works point by point: by machine code once that pays, by numpy until then."""
-    if backend == "numpy" or not all(isinstance(arg, Cell) for arg in args):
+    if backend == "numpy":
         return in_chunks(kernel, rt, trace, args)
     sides = trace or {}  # a plain kernel calls nothing: masks are all that there is
-    parts = [x for arg in args for x in (arg.v, arg.e, *arg.t, *arg.et)]  # type: ignore[union-attr]
-    varying = tuple(part.__class__ is np.ndarray for part in parts)
+    parts: list[Any] = []  # runs with every kernel: no generators
+    for arg in args:
+        if arg.__class__ is not Cell:
+            return in_chunks(kernel, rt, trace, args)
+        parts += (arg.v, arg.e, *arg.t, *arg.et)
+    varying = tuple([part.__class__ is np.ndarray for part in parts])
     forced = tuple([(at, side.__class__ is np.ndarray) for at, side in sides.items()])
     found = kernel.native.get((varying, forced))
     if found is None:

@@ -42,16 +42,12 @@ Sides = tuple[tuple[int, bool], ...]  # the sites whose sides are forced, and wh
 
 
 class Layout(Struct, frozen=True):
-    """What is done where. prelude: of the parts in `uniform`, gives what is in `given`; the function takes that and the
-    parts in `arrays`, and gives `outputs`."""
+    """What is done where. prelude: of arguments gives numbers and arrays, which the function takes. outputs: how many
+    arrays it gives. result: what all of these are put together to."""
 
-    parts: dict[str, Part]
-    uniform: tuple[str, ...]
-    prelude: Callable[..., tuple[Any, ...]]
-    given: tuple[str, ...]
-    arrays: tuple[str, ...]
-    outputs: tuple[str, ...]
-    result: Result
+    prelude: Callable[..., tuple[tuple[Any, ...], list[Array]]]
+    outputs: int
+    result: Callable[[tuple[Any, ...], list[Array], Array], Value]
 
 
 class Pointwise:
@@ -81,43 +77,30 @@ class Pointwise:
         if not arrays:
             raise NotStraight("the same at all points")
         outputs = tuple(name for name in names if name in made)
-        uniform = tuple(name for name in straight.parts if name in constant)
-        prelude = straight.prelude(constant, given)
-        self.layout = Layout(straight.parts, uniform, prelude, given, arrays, outputs, straight.result)
+        known = {name: f"{row}[{at}]" for row, names in (("given", given), ("arrays", arrays), ("outputs", outputs))
+                 for at, name in enumerate(names)}  # fmt: skip
+        result = eval(f"lambda given, arrays, outputs: {_unpacked(straight.result, known)}", {"Cell": Cell})
+        self.layout = Layout(straight.prelude(constant, given, arrays), len(outputs), result)
         return _text(operations, arrays, given, outputs)
 
     def run(self, function: Loaded, rt: Runtime, trace: Trace, args: Sequence[Value]) -> Value:
         """The kernel's value; its arrays all have the shape of the batch."""
         layout = self.layout
         assert layout is not None
-        parts = layout.parts
-        numbers = {name: _part(args, trace, parts[name]) for name in layout.uniform}
-        given = layout.prelude(rt, *numbers.values())
+        sides = {at: _side(side) for at, side in trace.items()} if trace else trace
+        given, arrays = layout.prelude(rt, sides, args)
         constants = array("d", [0.0 if x is None else x for x in given])
-        arrays = [_part(args, trace, parts[name]) for name in layout.arrays]
-        shape = arrays[0].shape
-        if not _flat(arrays, shape):
-            shape = np.broadcast_shapes(*(a.shape for a in arrays))
-        outputs = np.empty((len(layout.outputs), *shape))
-        size, first = 8 * math.prod(shape), address(outputs)
-        ends = [first + size * i for i in range(len(outputs))]
-        frame = array("q", _frame(arrays, shape) + ends)
+        shape, found = _frame(arrays)
+        outputs = np.empty((layout.outputs, *shape))
+        size, first = math.prod(shape), address(outputs)
+        frame = array("q", [*found, *[first + 8 * size * at for at in range(layout.outputs)]])
         function.call(frame.buffer_info()[0], constants.buffer_info()[0])
-        counts.native_points += size // 8
-        numbers.update(zip(layout.given, given, strict=True))
-        numbers.update(zip(layout.arrays, arrays, strict=True))
-        numbers.update(zip(layout.outputs, outputs, strict=True))
-        return _unpacked(layout.result, numbers)
+        counts.native_points += size
+        return layout.result(given, arrays, outputs)
 
 
-def _part(args: Sequence[Value], trace: Trace, part: Part) -> Any:
-    if part.kind == SIDE:
-        side = trace[part.path[0]]
-        return side.astype(float) if isinstance(side, np.ndarray) else bool(side)
-    found = getattr(args[part.path[0]], part.kind)
-    if part.kind in ("t", "et"):
-        found = found[part.direction]
-    return 0.0 if found is None else found
+def _side(side: Any) -> Any:
+    return side.astype(float) if isinstance(side, np.ndarray) else bool(side)
 
 
 def _parts(number: int, value: Value) -> list[Part]:
@@ -129,14 +112,18 @@ def _parts(number: int, value: Value) -> list[Part]:
     ]
 
 
-def _unpacked(result: Result, known: dict[str, Any]) -> Value:
+def _unpacked(result: Result, known: dict[str, str]) -> str:
+    """How a result is put together of what is known by such a text."""
     if not isinstance(result, Packed):
-        return tuple(_unpacked(item, known) for item in result)
+        return f"({''.join(f'{_unpacked(item, known)}, ' for item in result)})"
 
-    def part(name: str | None) -> Any:
-        return None if name is None else known[name] if name in known else float(name)
+    def part(name: str | None) -> str:
+        if name is None or name in known:
+            return "None" if name is None else known[name]
+        return repr(float(name)) if math.isfinite(float(name)) else f"float({name!r})"
 
-    return Cell(part(result.v), part(result.e), tuple(map(part, result.t)), tuple(map(part, result.et)))
+    t, et = ("".join(f"{part(name)}, " for name in names) for names in (result.t, result.et))
+    return f"Cell({part(result.v)}, {part(result.e)}, ({t}), ({et}))"
 
 
 def address(numbers: Any) -> int:
@@ -144,12 +131,15 @@ def address(numbers: Any) -> int:
     return numbers.__array_interface__["data"][0]  # type: ignore[no-any-return]
 
 
-def _frame(arrays: list[Array], shape: tuple[int, ...]) -> list[int]:
-    """Rows of numbers: how many (of two axes), how long, and per array where it starts and the steps of both axes.
+def _frame(arrays: list[Array]) -> tuple[tuple[int, ...], list[int]]:
+    """The shape that arrays have together, and rows of numbers: how many (of two axes), how long, and per array where
+    it starts and the steps of both axes.
 
     Arrays that don't lie so are copied; they are replaced in the list, so that they live as long as it does.
     """
+    shape = arrays[0].shape
     if not _flat(arrays, shape):
+        shape = np.broadcast_shapes(*(a.shape for a in arrays))
         inner = shape[-1]
         middle = shape[-2] if len(shape) > 1 else 1
         found = [math.prod(shape[:-2]), middle, inner]
@@ -162,11 +152,11 @@ def _frame(arrays: list[Array], shape: tuple[int, ...]) -> list[int]:
                 front = [steps[-2] * middle] if len(shape) > 1 else []
             found += [address(a), front[0] if front else 0, steps[-2] if len(shape) > 1 else 0]
         if not _flat(arrays, shape):
-            return found
+            return shape, found
     found = [1, 1, math.prod(shape)]
     for a in arrays:
         found += (address(a), 0, 0)
-    return found
+    return shape, found
 
 
 def _flat(arrays: list[Array], shape: tuple[int, ...]) -> bool:

@@ -48,6 +48,15 @@ class Part(Struct, frozen=True):
     kind: str
     direction: int = 0
 
+    @property
+    def text(self) -> str:
+        """How it is read from the arguments of a kernel, and the sides that are forced; 0 where there is none."""
+        at = self.path[0]
+        if self.kind == SIDE:
+            return f"sides[{at}]"
+        part = f"args[{at}].{self.kind}{f'[{self.direction}]' if self.kind in ('t', 'et') else ''}"
+        return part if self.kind == "v" else f"0.0 if {part} is None else {part}"
+
 
 class Operation(Struct, frozen=True):
     """`name` = `code` of arguments, which are names or numbers as text."""
@@ -115,16 +124,18 @@ class Straight(Struct, frozen=True):
                 known.difference_update(line.sets)
         return frozenset(known)
 
-    def prelude(self, constant: frozenset[str], wanted: tuple[str, ...]) -> Callable[..., tuple[Any, ...]]:
-        """A function of `rt` and the parts in `constant`, in the order of `parts`, to the numbers that are wanted."""
-        body: list[ast.stmt] = [line.node for line in self.lines if set(line.sets) <= constant]
-        given = ["rt", *(name for name in self.parts if name in constant)]
-        body.append(ast.Return(ast.Tuple([ast.Name(name, ast.Load()) for name in wanted], ast.Load())))
-        arguments = ast.arguments([], [ast.arg(name) for name in given], None, [], [], None, [])
-        function = ast.FunctionDef("prelude", arguments, body, [])
-        module = ast.fix_missing_locations(ast.Module([function], []))
+    def prelude(
+        self, constant: frozenset[str], wanted: tuple[str, ...], arrays: tuple[str, ...]
+    ) -> Callable[..., tuple[tuple[Any, ...], list[Any]]]:
+        """A function of `rt`, the sides of a trace and arguments to the numbers that are wanted, all of them in
+        `constant`, and to the parts that are arrays."""
+        read = [f"{name} = {part.text}" for name, part in self.parts.items() if name in constant or name in arrays]
+        found = f"return ({''.join(f'{name}, ' for name in wanted)}), [{', '.join(arrays)}]"
+        module = ast.parse(f"def prelude(rt, sides, args): {'; '.join((*read, found))}")
+        body: list[ast.stmt] = module.body[0].body  # type: ignore[attr-defined]
+        body[-1:-1] = [line.node for line in self.lines if set(line.sets) <= constant]
         scope = {**self.kernel.run.__globals__, "trace": None}
-        exec(compile(module, "<prelude>", "exec"), scope)
+        exec(compile(ast.fix_missing_locations(module), "<prelude>", "exec"), scope)
         return scope["prelude"]  # type: ignore[no-any-return]
 
     def operations(self, constant: frozenset[str]) -> list[Operation]:
