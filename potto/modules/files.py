@@ -168,7 +168,7 @@ class Files:
                     self.db.set_input(key, list_folder(key[1]), DISK)
             if keys is None and self.db.has_input(("workspace",)):
                 self._list_workspace()
-        return tuple(differ)
+        return tuple(dict.fromkeys(differ))  # data that a message has shown is a file as well
 
     def all_files(self) -> tuple[str, ...]:
         """The programs under the roots (see `folders` for which), and those that are open, sorted."""

@@ -51,6 +51,8 @@ _ELSEWHERE = {
     "shape": "write `len(xs)`, and `len(xs[0])` for a row",
     "append": "an array has its size for good: write all of it, `[… for i in 0..n-1]`",
     "sum": "write `sum x in xs (x)`",
+    "product": "write `product x in xs (x)`",
+    "prod": "write `product x in xs (x)`",
     "read": 'write `load("data.csv")`',
     "open": 'write `load("data.csv")`',
     "read_csv": 'write `load("data.csv")`',

@@ -266,6 +266,8 @@ def _estimate(name: str, argument: Estimate, batch: Batch, to_function: ToFuncti
     if _holds_functions(plain):
         message = f"`{name}` holds functions, of which an answer has no more than their places"
         raise wrong_call(message, "give its parts: `(2.0, f)`, or a dictionary by the names of its fields")
+    if plain is argument.value and isinstance(plain, tuple | list):
+        plain = tuple(argument) if isinstance(plain, tuple) else list(argument)  # each with its own error
     return value_of(name, plain, batch, to_function)
 
 

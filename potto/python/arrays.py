@@ -9,7 +9,7 @@ own batch.
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -31,6 +31,8 @@ def with_arrays(name: str, argument: Any, type: Type, sizes: Sizes) -> Any:
         return _array(name, argument, found, sizes)
     if isinstance(found, TupleOf) and found.dual and not isinstance(argument, tuple):
         return with_arrays(name, argument, found.items[0], sizes)  # without tangents
+    if isinstance(argument, Estimate) and argument.tangent is None and isinstance(argument.value, tuple):
+        argument = tuple(argument)  # its parts, each with its own error
     if isinstance(found, TupleOf) and found.record is not None and not isinstance(argument, tuple):
         argument = _fields(name, argument, found.record)
     if isinstance(found, TupleOf) and isinstance(argument, tuple) and len(argument) == len(found.items):
@@ -78,8 +80,8 @@ def _array(name: str, argument: Any, type: ArrayOf, sizes: Sizes) -> Any:
     item = resolve(type.item)
     if isinstance(argument, Mapping) and isinstance(item, TupleOf) and item.record is not None:
         return _columns(name, argument, type.size, item, item.record, sizes)
-    if isinstance(argument, list) and _of_numbers(type):
-        with contextlib.suppress(TypeError, ValueError):  # of answers, or not of one shape
+    if isinstance(argument, list) and _of_numbers(type) and not _holds_answers(argument):
+        with contextlib.suppress(TypeError, ValueError):  # not of one shape
             axes = axes_of(type) or 0
             numbers = np.array(argument, dtype=float) if argument else np.zeros(_without_elements(type))
             _must_be_there(name, argument, numbers)
@@ -91,6 +93,17 @@ def _array(name: str, argument: Any, type: ArrayOf, sizes: Sizes) -> Any:
         items = [with_arrays(f"{name}[{n}]", item, type.item, sizes) for n, item in enumerate(argument)]
         return listed(items) if items and all(isinstance(item, Rows) for item in items) else items
     return argument
+
+
+def _holds_answers(items: Sequence[Any]) -> bool:
+    """Whether there are answers in lists and tuples of any depth, of which numpy would take the numbers alone."""
+    while items:
+        kinds = set(map(type, items))
+        if any(issubclass(kind, Estimate) for kind in kinds):
+            return True
+        nested = any(issubclass(kind, list | tuple) for kind in kinds)
+        items = [part for item in items if isinstance(item, list | tuple) for part in item] if nested else []
+    return False
 
 
 def _of_table(name: str, table: Any) -> Any:
@@ -150,6 +163,8 @@ def _columns(
 
 def _answer(name: str, answer: Estimate, type: ArrayOf, sizes: Sizes) -> Any:
     """An array that was an answer, with the errors that it has."""
+    if isinstance(answer.value, list):
+        return _array(name, list(answer), type, sizes)
     value = _array(name, answer.value, type, sizes)
     off = np.asarray(answer.error, dtype=float) if isinstance(answer.error, np.ndarray | list | float) else None
     if not isinstance(value, Rows) or off is None or not off.any():

@@ -159,6 +159,11 @@ def _special(stop: Stop) -> Diagnostic | None:
         return kinds.UNEXPECTED(at.span, "unexpected `,`", help="separate the names of a `let` by `;`, or by lines")
     is_field = at.text.isidentifier() and stop.after is not None and stop.after.kind == "COLON"
     if is_field and stop.tokens[0].kind == "RECORDDEF":
+        if stop.before is not None and stop.before.kind not in ("LPAR", "COMMA"):
+            return kinds.RECORD_FORM(
+                at.span, f"expected `,` before `{at.text}`", help="fields are separated by `,`",
+                suggestions=write(stop.text, Span(stop.before.end, stop.before.end), ","),
+            )  # fmt: skip
         return reserved_word(at.text, at.span)
     found = _of_arrays(stop) or _behind_with(stop)
     if found is not None:

@@ -10,10 +10,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from potto.diagnostics import Diagnostic, Related, Suggestion, shortened
+from potto.diagnostics import Diagnostic, Suggestion, shortened
 from potto.modules.builtins import DERIVATIVES
 from potto.primitives import PRIMITIVES
-from potto.quick import replace
 from potto.reports.near import did_you_mean, instead, near_names
 from potto.source import Span
 from potto.syntax import nodes
@@ -24,11 +23,12 @@ from potto.types.context import Inference, Plan, rule
 from potto.types.forms import delta, deriv
 from potto.types.infer import is_known, special
 from potto.types.loading import loaded
-from potto.types.mismatches import BY_PARTS, between, comparison, describe, mismatch, no_field, of_one, sized_by
+from potto.types.mismatches import between, comparison, describe, no_field, of_one
 from potto.types.motionless import check_tangents, takes_duals
+from potto.types.origins import misfit
 from potto.types.scope import Builtin
 from potto.types.slopes import slope
-from potto.types.still import lacks_tangents, makes_dual, stands_still
+from potto.types.still import makes_dual, stands_still
 from potto.types.types import (
     REAL,
     UNKNOWN,
@@ -45,7 +45,6 @@ from potto.types.types import (
     Unknown,
     function,
     groups_of,
-    holds_functions,
     resolve,
     without_d,
 )
@@ -377,22 +376,8 @@ class _Filling:
             return
         if not self.inference.fits(self.types[place], expected):
             what = f"`{name}`" if name else "the argument"
-            said = mismatch(
-                self.types[place],
-                expected,
-                expr,
-                f"{what} of {callee_name(self.node)}",
-                self._sized_by(place, expected),
-            )
-            if lacks_tangents(self.types[place], expected):
-                help = BY_PARTS if holds_functions(expected) else "give its tangents as well: `(value, tangents)`"
-                said = replace(said, help=help)
-            self.inference.report(said)
-
-    def _sized_by(self, place: int, expected: Type) -> tuple[Related, ...]:
-        """The argument that says how many elements another one must have."""
-        given = [(p.type, slot[0]) for p, slot in zip(self.parameters, self.slots) if len(slot) == 1]
-        return sized_by(expected, [(type, self.node.arguments[at].value) for type, at in given if at != place])
+            found, what = (self.types[place], expected), f"{what} of {callee_name(self.node)}"
+            self.inference.report(misfit(self.inference, self.node, place, self.parameters, self.slots, found, what))
 
 
 def _record_of(parameters: Sequence[Parameter], made: Type) -> RecordName | None:

@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 
 from potto.diagnostics import Related, Suggestion, shortened, suggest
-from potto.modules.texts import definition
 from potto.quick import quick, value
 from potto.source import Span
 from potto.syntax import nodes
@@ -18,7 +17,8 @@ from potto.syntax.written import number, without_parentheses
 from potto.types import kinds
 from potto.types.context import End, Inference, Reach, rule
 from potto.types.mismatches import between
-from potto.types.scope import Global, Local
+from potto.types.origins import defined
+from potto.types.scope import Local
 from potto.types.types import (
     UNKNOWN,
     AnySize,
@@ -81,12 +81,12 @@ def _in_range(inference: Inference, size: Type, node: nodes.Index, place: int) -
     known = constant(index)
     if known is None:
         _whole(inference, index)
-        _behind(inference, size, node, index)
+        _behind(inference, size, node, place)
         _beyond(inference, size, node, index)
     elif not isinstance(size, Count):
         _from_the_end(inference, known, node, place)
     elif not 0 <= known < size.number:
-        _out_of_range(inference, known, size.number, node, index)
+        _out_of_range(inference, known, size.number, node, place)
 
 
 def _whole(inference: Inference, index: nodes.Expr) -> None:
@@ -116,12 +116,13 @@ def whole_bounds(inference: Inference, over: nodes.Range) -> None:
             ))  # fmt: skip
 
 
-def _behind(inference: Inference, size: Type, node: nodes.Index, index: nodes.Expr) -> None:
+def _behind(inference: Inference, size: Type, node: nodes.Index, place: int) -> None:
     """Report an index that is the size of the array, or more, whatever that is: `xs[n]`, `xs[len(xs)]`."""
+    index = node.indices[place]
     at = shifted(size_of(inference, index), 0)
     if isinstance(at, Count) and isinstance(size, Count):
         if at.number >= size.number:
-            _out_of_range(inference, at.number, size.number, node, index)
+            _out_of_range(inference, at.number, size.number, node, place)
         return
     written, known = _end(at), _end(size)
     if written is None or known is None or written.base is not known.base or written.offset < known.offset:
@@ -129,7 +130,7 @@ def _behind(inference: Inference, size: Type, node: nodes.Index, index: nodes.Ex
     last = _moved(index, known.offset - 1 - written.offset)
     message = f"the index `{print_expression(index)}` is out of range: it is not below the number of elements"
     inference.report(kinds.OUT_OF_RANGE(
-        index.span, message, label="behind the last", related=_defined(inference, node.array, "is defined here"),
+        index.span, message, label="behind the last", related=defined(inference, node.array, "is defined here"),
         help=f"indices count from 0, so the last one is `{last}`", suggestions=(suggest(index.span, last),),
     ))  # fmt: skip
 
@@ -167,7 +168,7 @@ def _beyond(inference: Inference, size: Type, node: nodes.Index, index: nodes.Ex
     bound = over.hi if upper else over.lo
     fit = _moved(bound, by if reached.down else -by)
     way = f"`{name}` goes from `{print_expression(over.lo)}` to `{print_expression(over.hi)}`"
-    related = (Related(over.span, way), *_defined(inference, node.array, "is defined here"))
+    related = (Related(over.span, way), *defined(inference, node.array, "is defined here"))
     inference.report(kinds.OUT_OF_RANGE(
         index.span, f"the index `{print_expression(index)}` is out of range: {why}",
         label="behind the last" if by > 0 else "below 0", related=related,
@@ -192,8 +193,8 @@ def _elements(count: int) -> str:
     return f"{count} element{'' if count == 1 else 's'}" if count else "no elements"
 
 
-def _out_of_range(inference: Inference, known: int, size: int, node: nodes.Index, index: nodes.Expr) -> None:
-    last = size - 1
+def _out_of_range(inference: Inference, known: int, size: int, node: nodes.Index, place: int) -> None:
+    index, last = node.indices[place], size - 1
     if last < 0:
         count, label, help = "no elements", "there are none", "an array without elements has no index"
     else:
@@ -201,34 +202,13 @@ def _out_of_range(inference: Inference, known: int, size: int, node: nodes.Index
         label, help = f"not in 0..{last}", f"indices count from 0, so the last one is {last}"
     if known < 0 <= last:
         help += f"; the last element is `[{last}]`"
-    message = f"the index {known} is out of range: the array has {count}"
+    message = f"the index {known} is out of range: {'each row' if place else 'the array'} has {count}"
     meant = size + known if -size <= known < 0 else last
     suggestions = (suggest(index.span, str(meant)),) if last >= 0 else ()
-    related = _defined(inference, node.array, f"has {count}")
+    related = defined(inference, node.array, "is defined here" if place else f"has {count}")
     inference.report(
         kinds.OUT_OF_RANGE(index.span, message, label=label, related=related, help=help, suggestions=suggestions)
     )
-
-
-def _defined(inference: Inference, array: nodes.Expr, what: str) -> tuple[Related, ...]:
-    """Where the name of an array, or of what it is a part of, gets its meaning."""
-    array = without_parentheses(array)
-    while isinstance(array, nodes.Field | nodes.Index):
-        array = without_parentheses(array.value if isinstance(array, nodes.Field) else array.array)
-        what = "is defined here"
-    if isinstance(array, nodes.Member):
-        meaning, what = inference.owners.get(id(array)) or inference.meanings.get(id(array)), "is defined here"
-    else:
-        meaning = inference.meanings.get(id(array))
-    if isinstance(meaning, Local):
-        return (Related(meaning.span, f"`{meaning.name}` {what}"),)
-    if not isinstance(meaning, Global):
-        return ()
-    file, name = meaning.target.file, meaning.target.name
-    item = definition(inference.outside.db, file, name)
-    if not isinstance(item, nodes.Definition):
-        return ()
-    return (Related(item.name_span, f"`{name}` {what}", file, name),)
 
 
 def constant(expr: nodes.Expr) -> int | None:

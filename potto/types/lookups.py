@@ -11,6 +11,7 @@ from potto.types import kinds
 from potto.types.context import Inference
 from potto.types.format import format_type
 from potto.types.mismatches import describe, mismatch
+from potto.types.origins import sides
 from potto.types.types import REAL, UNKNOWN, ArrayOf, Count, Function, Meta, Truth, Type, resolve
 from potto.types.unify import unify
 
@@ -32,7 +33,7 @@ def interp(inference: Inference, node: nodes.Apply, types: list[Type]) -> Type:
         a, b = format_type(resolve(xs)), format_type(found)
         inference.report(kinds.SIZES(
             node.span, f"`interp` takes as many values as places, but these are `{a}` and `{b}`",
-            label="two sizes", related=(Related(places.span, f"`{a}`"), Related(values.span, f"`{b}`")),
+            label="two sizes", related=sides(inference, (places, xs), (values, found)),
             help="take as many of both",
         ))  # fmt: skip
     _several(inference, resolve(size), places, "interp")

@@ -35,9 +35,11 @@ from potto.types.unify import is_named_alike, unify
 
 
 def lacks_tangents(actual: Type, expected: Type) -> bool:
-    """Whether a tuple or a record is given for itself and its tangents, or an array that holds functions for theirs."""
+    """Whether a tuple or a record is given for itself and its tangents, or an array that holds functions for theirs.
+    What is not known of it may be anything: `\\x . x` is a function of numbers as well as of duals.
+    """
     values = _values_like(actual, expected)
-    return values is not None and _alike(actual, values)
+    return values is not None and _alike(actual, values, guess=True) and not _alike(actual, expected, guess=True)
 
 
 def _values_like(actual: Type, expected: Type) -> Type | None:
@@ -132,11 +134,11 @@ def _alike(a: Type, b: Type, guess: bool = False) -> bool:
 def stands_still(inference: Inference, call: nodes.Apply, argument: nodes.Expr, expected: Type) -> bool:
     """Whether an argument of a derivative is given without tangents, and that can be seen wherever it is looked at."""
     found = inference.types[id(argument)]
-    values = _values_like(found, expected)
-    if values is None or not _alike(found, values, guess=True) or _alike(found, expected, guess=True):
+    if not lacks_tangents(found, expected):
         return False
     known = _evident(inference, argument) and _of_a_definition(inference, head_of(inference, call))
-    return known and unify(found, values)
+    values = _values_like(found, expected)
+    return known and values is not None and unify(found, values)
 
 
 def _of_a_definition(inference: Inference, head: nodes.Expr) -> bool:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from potto.diagnostics import Diagnostic, Related, Suggestion, suggest
+from potto.diagnostics import Diagnostic, Suggestion, suggest
 from potto.modules.hints import known_elsewhere
 from potto.source import Span
 from potto.syntax import nodes
@@ -17,6 +17,7 @@ from potto.types.context import Inference, Part
 from potto.types.format import format_type, format_types
 from potto.types.lookups import image, interp
 from potto.types.mismatches import array_fields, describe, no_field
+from potto.types.origins import sides
 from potto.types.types import (
     REAL,
     UNKNOWN,
@@ -67,7 +68,7 @@ def combined(inference: Inference, left: Type, operand: nodes.Operand, right: Ty
         return right
     problem = _differ(left, right)
     if problem is not None:
-        inference.report(_disagree(left, right, operand, problem))
+        inference.report(_disagree(inference, left, right, operand, chain, problem))
         return UNKNOWN
     return left if is_vector(left) else right
 
@@ -88,7 +89,16 @@ def _differ(a: Type, b: Type) -> tuple[Type, Type] | None:
     return None if unify(a, REAL) and unify(b, REAL) else (a, b)
 
 
-def _disagree(left: Type, right: Type, operand: nodes.Operand, problem: tuple[Type, Type]) -> Diagnostic:
+def _left_of(chain: nodes.Chain, operand: nodes.Operand) -> nodes.Expr:
+    place = next(place for place, each in enumerate(chain.rest) if each is operand)
+    before = chain.rest[:place]
+    return nodes.Chain(chain.first.span.cover(before[-1].value.span), chain.first, before) if before else chain.first
+
+
+def _disagree(
+    inference: Inference, left: Type, right: Type, operand: nodes.Operand, chain: nodes.Chain,
+    problem: tuple[Type, Type],
+) -> Diagnostic:  # fmt: skip
     shown, other = format_types((left, right))
     if isinstance(problem[0], SIZES) and isinstance(problem[1], SIZES):
         a, b = format_types(problem)
@@ -96,6 +106,7 @@ def _disagree(left: Type, right: Type, operand: nodes.Operand, problem: tuple[Ty
             operand.op_span,
             f"`{operand.op}` goes component by component, but the left has {a} and the right {b}",
             label=f"`{shown}` and `{other}`",
+            related=sides(inference, (_left_of(chain, operand), left), (operand.value, right)),
             help="take as many of both",
         )
     scalar = isinstance(resolve(left), Real) != isinstance(resolve(right), Real)
@@ -169,8 +180,9 @@ def _no_part(inference: Inference, found: Type, name: str, span: Span, place: in
     else:
         message = f"this is {describe(found)}, which has no part `.{name}`"
         if isinstance(found, ArrayOf):
-            help = known_elsewhere(name) or f"an element is `xs[{place or 0}]`"
-            if place is not None:
+            inside = place is not None and not (isinstance(size := resolve(found.size), Count) and place >= size.number)
+            help = known_elsewhere(name) or f"an element is `xs[{place if inside else 0}]`"
+            if inside:
                 suggestions = (suggest(Span(span.start - 1, span.end), f"[{place}]"),)
     return kinds.NO_FIELD(span, message, label=label, help=help, suggestions=suggestions)
 
@@ -258,7 +270,7 @@ def _alike(inference: Inference, found: list[Type], node: nodes.Apply, name: str
     elif problem is not None:
         a, b = format_types((left, right))
         message = f"`{name}` takes two vectors of one size, but these are `{a}` and `{b}`"
-        both = tuple(Related(item.value.span, f"`{shown}`") for item, shown in zip(node.arguments, (a, b)))
+        both = sides(inference, *((item.value, type) for item, type in zip(node.arguments, found)))
         inference.report(kinds.SIZES(node.span, message, label="two sizes", related=both, help="take as many of both"))
 
 

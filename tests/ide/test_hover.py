@@ -336,3 +336,10 @@ def test_what_a_file_of_data_holds(tmp_path):
 def test_what_nothing_moves_has_no_derivative(made: str) -> None:
     assert "deriv" not in (text := fixture(f"k = {made}\n").hover("k")) and "d k" not in text and "k : " in text
     assert "d k : " in fixture("k = (sin, cos)\n").hover("k")
+
+
+def test_the_name_of_a_size_is_a_number():
+    assert (
+        "n : Real" in (text := fixture("def f(xs: [n] Real) sum x in xs (x)/n\n").hover("/n", 1))
+        and "size of `f`" in text
+    )

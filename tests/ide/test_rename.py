@@ -160,3 +160,24 @@ def test_there_and_back_again():
     back = ide.rename(f.db, f.file, f.offset, "g")
     assert isinstance(back, ide.Change) and len(back.files) == 2
     assert not f.errors()
+
+
+def test_the_name_of_a_size():
+    text = "def f(a: [$0n, m] Real, v: [m] Real) -> [n - 1] Real\n    [a[i + 1, m - 1]*v[0]/n for i in 0..n-2]\n"
+    f, change = renamed(text, "rows")
+    after = (
+        "def f(a: [rows, m] Real, v: [m] Real) -> [rows - 1] Real\n    [a[i + 1, m - 1]*v[0]/rows for i in 0..rows-2]\n"
+    )
+    assert f.after(change)["main.po"] == after
+    f, change = renamed("def f(a: [n] Real, v: [$0n] Real) a[0]*v[n - 1]\n", "v")
+    assert isinstance(change, ide.Refused)
+
+
+def test_a_parameter_that_hides_a_size():
+    f, change = renamed("def f($0m: [n, m] Real) m[0, n - 1]\n", "mat")
+    assert f.after(change)["main.po"] == "def f(mat: [n, m] Real) mat[0, n - 1]\n"
+
+
+def test_a_record_in_the_type_of_a_lambda():
+    f, change = renamed("record $0Cam(focal: Real)\nf = \\(q: Cam) . q.focal\n", "Lens")
+    assert f.after(change)["main.po"] == "record Lens(focal: Real)\nf = \\(q: Lens) . q.focal\n"

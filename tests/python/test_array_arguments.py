@@ -408,3 +408,45 @@ def test_a_table_is_taken_by_its_names() -> None:
     module = potto.compile(DISCS)
     assert module.flat(Table(), 0.5).value == 50
     assert (module.k.value, module.k.tangent) == (5, 2)
+
+
+SHAPES = """
+record T(at: (Real, Real), grey: Real)
+def made(k) [T(at=(integral [0, 1] k*x d(x), i), grey=k) for i in 0..2]
+def weight(ts: [n] T, t) sum s in ts (s.grey*s.at.x*t + s.at.y)
+"""
+
+
+def test_an_answer_of_records_of_several_shapes_is_an_argument_again() -> None:
+    """Each of three is k * k/2 * t, and i = 0, 1, 2 are added; 1e-15 is four roundings."""
+    module = potto.compile(SHAPES)
+    made = module.made(0.5)
+    assert module.weight(made, 2.0).value == pytest.approx(3 * 0.5 * (0.5 / 2) * 2 + 3, rel=1e-15)
+    assert module.weight(made[1:], 2.0).value == pytest.approx(2 * 0.5 * (0.5 / 2) * 2 + 3, rel=1e-15)
+    with potto.settings(method="mc", samples=100):
+        made = module.made(0.5)
+    off = sum(0.5 * 2 * error[0][0] for error in made.error)  # by 1/2 of grey and t = 2, one like the other
+    assert module.weight(made, 2.0).error == pytest.approx(off, rel=1e-9)
+
+
+def test_answers_in_tuples_lists_and_records_keep_their_errors() -> None:
+    """Of each sum the error is that of the one answer in it: floats have none, and roundings are 1e-15 of it."""
+    module = potto.compile("""
+record Part(a: Real, b: Real)
+def made(k) Part(integral [0, 1] k*x d(x), 2)
+def pair(k) (integral [0, 1] k*x d(x), 2)
+def of_numbers(ts: [n] Real) sum s in ts (s)
+def of_rows(ts: [n, m] Real) sum i in 0..n-1 (ts[i, 0])
+def of_parts(ts: [n] Part) sum s in ts (s.a + s.b)
+def of_part(s: Part) s.a + s.b
+def of_pair(p: (Real, Real)) p.0 + p.1
+""")
+    with potto.settings(method="mc", samples=20):
+        made, pair = module.made(0.5), module.pair(0.5)
+    number, off = made[0], made[0].error
+    assert off > 1e-3
+    found = [
+        module.of_numbers([number, 1.0]), module.of_rows([[number], [1.0]]), module.of_part(made),
+        module.of_parts([(number, 0.0), (1.0, 1.0)]), module.of_parts([made]), module.of_pair(pair),
+    ]  # fmt: skip
+    assert [each.error for each in found] == pytest.approx([off] * 6, rel=1e-9)

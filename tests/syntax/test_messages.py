@@ -261,6 +261,8 @@ def test_records() -> None:
         #             ^^ error[P0122]: a record needs at least one field
         record Untyped(x, y: Real)
         #              ^ error[P0122]: the field `x` has no type
+        record Joined(x: Real y: Real)
+        #                     ^ error[P0122]: expected `,` before `y`
     """)
 
 

@@ -58,6 +58,9 @@ HOLDERS = """
 record P(w: Real, f: Real -> Real)
 square = \\x . x*x
 step = \\y . [y > 0.5]
+id = \\x . x
+unit = \\x . 1
+def both(fs: (Real -> Real, Real -> Real), t) fs.0(t) + fs.1(t)
 def h(p: P, t) p.w*t + (p.f)(t)
 def g(q: (Real, Real -> Real), t) fst q*t + (snd q)(t)
 def two(fs: [2] (Real -> Real), t) (fs[0])(t) + t*(fs[1])(t)
@@ -83,6 +86,9 @@ scene = [P(1, step), P(2, step)]
         ("deriv(h)(P((3, 1), deriv(square)) with w = (4, 0), (2, 1))", 12, 8),
         ("deriv(two)([square, square], (2, 1))", 12, 16),
         ("deriv(two)([sqrt, square], (4, 1))", 66, 48.25),
+        ("deriv(two)([unit, id], (4, 1))", 17, 8),  # of any type: functions of numbers as well as of duals
+        ("deriv(both)((id, square), (4, 1))", 20, 9),
+        ("deriv(both)((square, unit), (4, 1))", 17, 8),
         ("deriv(all)([P(1, square), P(2, square)], (2, 1))", 20, 20),
         ("deriv(all)([P((1, 1), deriv(square)), P((2, 0), deriv(square))], (2, 1))", 20, 28),
         ("deriv(all)([((1, 1), deriv(square)), ((2, 0), deriv(square))], (2, 1))", 20, 28),

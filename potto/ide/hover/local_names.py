@@ -34,6 +34,7 @@ TITLES = {
     "variable": "variable of integration",
     "index": "index",
     "loop": "loop variable",
+    "size": "size",
 }
 
 
@@ -78,6 +79,8 @@ def _field(db: Database, symbol: LocalSymbol) -> str:
 def local_type(db: Database, symbol: LocalSymbol) -> Type:
     """The type of a local name where it is bound; for a parameter, the type that it accepts."""
     chunk, binder = symbol.chunk, symbol.binder
+    if binder.kind == "size":
+        return Real()
     name = owner(db, chunk)
     inside = live_at(chunk, binder.span.start)
     if name is None or inside is not None:

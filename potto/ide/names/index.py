@@ -17,11 +17,11 @@ from msgspec import Struct
 from potto.modules import parsed
 from potto.query import Database, query
 from potto.source import Span
-from potto.syntax import RESERVED, children, live_expressions, nodes, parse_expression
+from potto.syntax import RESERVED, children, live_expressions, nodes, parse_expression, walk
 
-BinderKind = Literal["parameter", "local", "variable", "index", "loop"]
+BinderKind = Literal["parameter", "local", "variable", "index", "loop", "size"]
 Role = Literal["bind", "use", "member", "path", "field", "keyword", "define", "module", "import", "alias", "measure"]
-
+_Groups = Sequence[Sequence[nodes.Parameter]]
 NOWHERE = Span(0, 0)
 _WORD = re.compile(r"[^\W\d]\w*")
 
@@ -181,7 +181,7 @@ class _Walk:
             case nodes.Apply():
                 return self._apply(node)
             case nodes.Lambda():
-                return self._scoped(self._groups(node.groups, Span(node.span.start, node.span.end)), (node.body,))
+                return self._headed(node.groups, node.span, (node.body,))
             case nodes.Integral():
                 return self._integral(node)
             case nodes.Reduction() | nodes.Comprehension():
@@ -213,9 +213,9 @@ class _Walk:
                 return self._diffeo(node)
             case nodes.RecordDefinition():
                 self.add(node.name_span, node.name, "define")
-                return self._scoped(self._groups((node.fields,), node.span), self._annotations((node.fields,)))
+                return self._headed((node.fields,), node.span, ())
             case nodes.Inverse():
-                return self._scoped(self._groups((node.parameters,), node.span), node.components)
+                return self._headed((node.parameters,), node.span, node.components)
             case nodes.For():
                 number = self.binder(node.variable.name, node.variable.span, "loop", node.span)
                 return (node.iterable, *self._scoped((number,), self._statements(node)))
@@ -272,15 +272,33 @@ class _Walk:
     def _unbind(self, numbers: Iterable[int]) -> _Unbind:
         return _Unbind(tuple(self.binders[number].name for number in numbers))
 
-    def _groups(self, groups: Sequence[Sequence[nodes.Parameter]], scope: Span) -> tuple[int, ...]:
+    def _groups(self, groups: _Groups, scope: Span) -> tuple[int, ...]:
         return tuple(
             self.binder(p.name, _name_span(p), "parameter", Span(p.span.end, max(p.span.end, scope.end)))
             for group in groups
             for p in group
         )
 
-    def _annotations(self, groups: Sequence[Sequence[nodes.Parameter]]) -> list[Any]:
-        return [p.annotation for group in groups for p in group if p.annotation is not None]
+    def _headed(
+        self, groups: _Groups, scope: Span, inner: Iterable[Any], result: nodes.TypeExpr | None = None
+    ) -> Sequence[Any]:
+        """Parameters, and the names of their sizes, which they hide, around what they are seen in."""
+        types = [p.annotation for group in groups for p in group if p.annotation is not None]
+        types += [] if result is None else [result]
+        return self._scoped((*self._sizes(types, scope), *self._groups(groups, scope)), (*types, *inner))
+
+    def _sizes(self, types: Iterable[nodes.TypeExpr], scope: Span) -> Iterable[int]:
+        """The names of sizes, which are numbers in the body; each is bound where it is written first."""
+        found: dict[str, int] = {}
+        written = (node for type in types for node in walk(type) if isinstance(node, nodes.ArrayType))
+        for size in (size for node in written for size in node.sizes):
+            name = size.name or "_"
+            span = Span(size.span.start, size.span.start + len(name))
+            if name in found or self.meant(name) >= 0:
+                self.add(span, name, "use", found[name] if name in found else self.meant(name))
+            elif name != "_":
+                found[name] = self.binder(name, span, "size", Span(span.end, max(span.end, scope.end)))
+        return found.values()
 
     def _integral(self, node: nodes.Integral) -> Sequence[Any]:
         steps: list[Any] = []
@@ -324,15 +342,14 @@ class _Walk:
         return (*steps, *rest, self._unbind(numbers))
 
     def _definition(self, node: nodes.Definition) -> Sequence[Any]:
-        numbers = self._groups(node.groups, node.span)
-        types = self._annotations(node.groups) + ([node.result] if node.result is not None else [])
-        return self._scoped(numbers, (*types, *self._block(node.bindings, (node.body,), node.span.end, "local")))
+        block = self._block(node.bindings, (node.body,), node.span.end, "local")
+        return self._headed(node.groups, node.span, block, node.result)
 
     def _diffeo(self, node: nodes.DiffeoDefinition) -> Sequence[Any]:
         groups = (node.variables, *node.groups)
         inverse = () if node.inverse is None else (node.inverse,)
         block = self._block(node.bindings, (*node.components, *inverse, *node.where), node.span.end, "local")
-        return self._scoped(self._groups(groups, node.span), (*self._annotations(groups), *block))
+        return self._headed(groups, node.span, block)
 
     def _statements(self, node: nodes.For) -> Sequence[Any]:
         return self._block(node.body, (), node.span.end, "local")

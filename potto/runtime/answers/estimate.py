@@ -331,7 +331,7 @@ def _plain(estimate: Estimate, changes: Mapping[str, Any]) -> Estimate:
 
 def _number_or(part: Any) -> Any:
     """A number of numpy as a float; everything else as it is."""
-    return part if isinstance(part, tuple | dict) or np.ndim(part) else float(part)
+    return part if isinstance(part, tuple | list | dict) or np.ndim(part) else float(part)
 
 
 def _same(mine: Any, theirs: Any) -> bool:
