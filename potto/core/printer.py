@@ -68,6 +68,7 @@ _Texts = dict[Term, _Text]
 
 
 LONGEST = 120  # characters of a term that a message shows whole
+LEFT_OUT = "..."  # what stands for a part that is too long to be written
 
 
 def abridged(term: Term) -> str:
@@ -79,7 +80,7 @@ def abridged(term: Term) -> str:
 
 
 def format_term(term: Term, limit: int = 20_000) -> str:
-    """A term as Potto source on one line. Parts longer than `limit` characters are left out as `...`.
+    """A term as Potto source on one line. Parts longer than `limit` characters are `LEFT_OUT`.
 
     Copies of bound variables, which have names that nobody can write (`k'1`), get names that one can (`k1`).
     """
@@ -88,7 +89,7 @@ def format_term(term: Term, limit: int = 20_000) -> str:
     names = _written(nodes)
     for node in nodes:
         text = _node(node if not names else _renamed(node, names), texts)
-        texts[node] = text if len(text.text) <= limit else _Text("...", _ATOM)
+        texts[node] = text if len(text.text) <= limit else _Text(LEFT_OUT, _ATOM)
     return texts[term].text
 
 

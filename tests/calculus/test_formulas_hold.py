@@ -27,7 +27,7 @@ EXAMPLES = Path(__file__).parents[2] / "examples"
 WITHOUT = {
     "room.po:mean", "hidden.po:pixel", "room.po:discomfort", "plate.po:stepped",  # too long to be read
     "geometry.po:pixel", "main.po:two_tones", "main.po:by_law", "shadows.po:sharp", "sphere.po:pixel",
-    "sphere.po:shaded", "stylize.po:pixel", "shaders.po:law", "shadows.po:softly",
+    "sphere.po:shaded", "stylize.po:pixel", "shadows.po:softly",
 }  # fmt: skip
 OPEN = {
     "options.po:digital_delta": "the derivative of a delta that is integrated out names it again",

@@ -14,7 +14,7 @@ from potto.calculus.explanation.brackets import constant
 from potto.calculus.explanation.factors import Factors, factored, written
 from potto.core.terms import ZERO, Branch, If, Prim, Term, add, children, mul, neg, prim, rebuild, sub, transform
 
-Cost = Callable[[Term], int]
+Cost = Callable[[Term], float]
 
 
 def in_one(node: If | Branch, tangents: frozenset[str], inside: frozenset[str], cost: Cost) -> Term:

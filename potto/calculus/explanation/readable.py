@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from fractions import Fraction
-from math import gcd, isfinite, isqrt, lcm, prod, ulp
+from math import gcd, inf, isfinite, isqrt, lcm, prod, ulp
 
 from msgspec import Struct
 
@@ -21,7 +21,7 @@ from potto.calculus.explanation.brackets import bracket as bracket_of
 from potto.calculus.explanation.factors import Factors, factored, is_tangent, written
 from potto.calculus.surfaces.branch_assignment import box_of, with_index
 from potto.core.polynomials import Monomial, Polynomial, shared_by, without
-from potto.core.printer import format_term
+from potto.core.printer import LEFT_OUT, format_term
 from potto.core.terms import (
     ONE,
     ZERO,
@@ -58,7 +58,7 @@ Box = Mapping[str, tuple[float, float]]
 _Binder = Integral | Sum | Array | Fold
 _ARITHMETIC = ("add", "neg", "mul", "div", "pow", "sqrt", "exp")
 _DIGITS = 15  # of a number that may have been rounded
-_LONG = 4000  # characters of a formula that nobody reads, beyond which nothing is tried
+_LONG = 100_000  # characters of a formula of which nobody will read what can be made, beyond which nothing is tried
 _MANY = 60  # nodes of what is expanded
 _SUMMANDS = 24
 _TANGENT = 4  # how much longer a formula seems for each tangent that it names
@@ -76,7 +76,7 @@ class Progress(Struct):
 def readable(term: Term, tangents: frozenset[str], box: Box | None = None, progress: Progress | None = None) -> Term:
     """The same value, written to be read; `tangents`: the names by which it is linear, `box`: the ranges of its
     variables."""
-    if len(format_term(term)) > _LONG:
+    if LEFT_OUT in format_term(term, _LONG):
         return term
     work = _Work(tangents, _bound(term) | frozenset(box or ()), progress or Progress())
     return _decided(transform(term, lambda _, new: work.node(new)), box or {}, work)
@@ -284,9 +284,9 @@ class _Work:
             term = substitute(term, {name: meant})
         return term
 
-    def _cost(self, form: Term) -> int:
+    def _cost(self, form: Term) -> float:
         text = format_term(form)
-        return len(text) + _TANGENT * sum(text.count(name) for name in self.tangents)
+        return inf if LEFT_OUT in text else len(text) + _TANGENT * sum(text.count(name) for name in self.tangents)
 
     def _product(self, coefficient: Fraction, *monomials: tuple[Monomial, int]) -> Term:
         found = Factors(coefficient, {}, [], [])

@@ -13,7 +13,7 @@ from msgspec import Struct
 from potto.calculus.algebra.radicals import NAN
 from potto.calculus.explanation.readable import Box, Progress, in_decimals, readable
 from potto.calculus.surfaces.trace import spine
-from potto.core.printer import format_term
+from potto.core.printer import LEFT_OUT, format_term
 from potto.core.simplify import simplify
 from potto.core.terms import (
     ONE,
@@ -74,7 +74,7 @@ class Words(Struct, frozen=True):
         if strangers:
             raise NoFormula(f"where it jumps depends on `{min(strangers)}`, over which it is summed")
         text = format_term(readable(simplify(self.fields(plain)), self.tangents, box, self.progress))
-        if "..." in text:
+        if LEFT_OUT in text:
             raise NoFormula("the formula is too long to be shown")
         return text
 
