@@ -248,12 +248,16 @@ def all_of(parts: list[Pieces]) -> Pieces:
 
 
 class Ends(Struct, frozen=True):
-    """The integrand at both ends of every segment, sides as on the segment, and its rounding there: (m, S) each."""
+    """The integrand at both ends of every segment, sides as on the segment, and its rounding there: (m, S) each.
+
+    share: which part of the integrand its rounding is, by the place where that is least.
+    """
 
     low: Array
     high: Array
     low_error: Array
     high_error: Array
+    share: Array
 
 
 def mostly(owner: Ints, root: Ints | None, size: int) -> Ints:

@@ -17,8 +17,8 @@ from potto.integrate.events import BUDGET_SPENT, TwoSided
 from potto.integrate.levels import LevelPlan
 from potto.integrate.panels.iterated import Iterated
 from potto.integrate.panels.mending import mend
-from potto.integrate.panels.roundoff import few_doubles, misplaced, noise, note_ends, shake, together
-from potto.integrate.pieces import Crossing, Ends, Evaluator, Pieces, Sums, all_of, column, dense, gather, still
+from potto.integrate.panels.roundoff import few_doubles, misplaced, noise, note_ends, shake, share, together
+from potto.integrate.pieces import Crossing, Ends, Evaluator, Pieces, Sums, all_of, column, dense, gather, still, take
 from potto.integrate.rules import substitution
 from potto.integrate.rules.gauss import EPS, Rule, gauss, truncation
 from potto.integrate.rules.substitution import Segments
@@ -27,6 +27,9 @@ from potto.kernels.cells import Array, Bools, Cell, Ints, Mask, Number, Value, p
 CHUNK = 1 << 15  # points per kernel call: a few buffers of this length fit the second-level cache
 MOST_SLACK = 1e6  # how many times the error of a node may be larger that hardly counts
 UNSURE = 1e-9  # how far off cuts may be, in parts of a segment, until it matters that integrands bend beside them
+# From which part of it on rounding at both ends may be what is left where an integrand vanishes: then places within
+# tell, at which not all is 0, or stands still, by symmetry.
+HIDDEN, WITHIN = 2.0**-40, (0.309, 0.618)
 BESIDE = 1e-9  # how far from the ends of a segment, in parts of it, it is looked at just inside
 
 
@@ -271,18 +274,34 @@ class PanelBatch(Struct, dict=True):
         """F at both ends of every segment, sides as on the segment; None where it is not needed."""
         if not self.last and not self.hinted and not (self.moving and self.sweeps()):
             return None
-        seg, frozen, plan = self.seg, self.machine.with_directions(0), self.parent.plan
-        names = plan.body.params if self.last else self.env
-        both = np.concatenate((seg.owner, seg.owner))
-        here = gather({n: still(v) for n, v in self.env.items() if n in names}, both)
-        here[self.level.variable] = Cell(np.concatenate(self.just_inside()))
+        seg = self.seg
+        owner = np.concatenate((seg.owner, seg.owner))
         sides = {g: np.concatenate((m, m)) if isinstance(m, np.ndarray) else m for g, m in self.sides.items()}
-        costs = self.machine.costs
+        costs, count = self.machine.costs, seg.a.size
         with nullcontext() if costs is None else costs.ends(seg.ta, seg.tb, self.parent.machine.directions):
-            f, e = self.parent.inside(self.number, here, both.size, sides, frozen, self.below(both))
-        count = seg.a.size
-        e = np.where(np.isfinite(e), e, 0.0)  # where F is infinite
-        return Ends(f[:, :count], f[:, count:], e[:, :count], e[:, count:])
+            f, e = self.still_at(np.concatenate(self.just_inside()), owner, sides)
+        part = np.minimum(share(f[:, :count], e[:, :count]), share(f[:, count:], e[:, count:]))
+        if self.last and not self.parent.tracked and (hidden := np.nonzero((part > HIDDEN).any(axis=0))[0]).size:
+            part[:, hidden] = self.share_within(hidden)
+        return Ends(f[:, :count], f[:, count:], e[:, :count], e[:, count:], part)
+
+    def share_within(self, index: Ints) -> Array:
+        """Which part of F its rounding is within segments, at places together: (m, I)."""
+        here = self.seg.pick(index)
+        x, _, _ = substitution.points(here, np.tile(WITHIN, (index.size, 1)))
+        rows = np.repeat(index, len(WITHIN))
+        sides = {g: take(m, rows) for g, m in self.sides.items()}
+        f, e = self.still_at(x.ravel(), self.seg.owner[rows], sides)
+        return share(*(np.abs(row).reshape(-1, *x.shape).sum(axis=-1) for row in (f, e)))
+
+    def still_at(self, x: Array, owner: Ints, sides: dict[int, Mask]) -> tuple[Array, Array]:
+        """F at places of members, without tangents, and its rounding, where F is finite: (m, N) each."""
+        names = self.parent.plan.body.params if self.last else self.env
+        here = gather({n: still(v) for n, v in self.env.items() if n in names}, owner)
+        here[self.level.variable] = Cell(x)
+        frozen = self.machine.with_directions(0)
+        f, e = self.parent.inside(self.number, here, x.size, sides, frozen, self.below(owner))
+        return f, np.where(np.isfinite(e), e, 0.0)
 
     def just_inside(self) -> tuple[Array, Array]:
         """The ends of segments; points next to them where on the ends themselves it is not known what is further in."""

@@ -1,7 +1,7 @@
 """What rounding does to the integral over a piece.
 
-Owns `shake` and `few_doubles` (of nodes), `noise` (of the integrand), `misplaced`, `note_ends` and `hidden_steps` (of
-the ends of segments) and `together` (of derivatives that move with the nodes).
+Owns `shake` and `few_doubles` (of nodes), `share` and `noise` (of the integrand), `misplaced`, `note_ends` and
+`hidden_steps` (of the ends of segments) and `together` (of derivatives that move with the nodes).
 """
 
 from __future__ import annotations
@@ -44,19 +44,23 @@ def shake(p: Pieces, seg: Segments, x: Array, weight: Array, put_right: bool) ->
     return np.where(shake <= 1.0, shake, np.where(np.isfinite(shake), 1.0, 0.0))
 
 
+def share(f: Array, e: Array) -> Array:
+    """Which part of numbers their errors are; infinite where nothing is left of them."""
+    part: Array = np.divide(e, np.abs(f), out=np.full(f.shape, np.inf), where=(f != 0) & np.isfinite(f))
+    return part
+
+
 def noise(ends: Ends, width: int, p: Pieces, seg: Segments) -> Array:
-    """What the integrand's own rounding, kept track of at the ends of segments, comes to in each channel: (C, P).
+    """What the integrand's own rounding, kept track of at places of segments, comes to in each channel: (C, P).
 
     More than a few units in the last place where terms of parameters cancel, or where sines of them have large
     arguments. What only grows towards one end is rounding of the variable, which is counted elsewhere.
     """
-    here = ((f[:, p.segment], e[:, p.segment]) for f, e in ((ends.low, ends.low_error), (ends.high, ends.high_error)))
-    shares = [np.divide(e, np.abs(f), out=np.full(f.shape, np.inf), where=(f != 0) & np.isfinite(f)) for f, e in here]
-    share = np.minimum(*shares)
-    share = np.where((share > 4 * EPS) & (share < 1), share, 0.0)
-    share = np.where(seg.kind == substitution.BOTH, 0.0, share)  # at a turning point little is left to be rounded
+    part = ends.share[:, p.segment]
+    part = np.where((part > 4 * EPS) & (part < 1), part, 0.0)
+    part = np.where(seg.kind == substitution.BOTH, 0.0, part)  # at a turning point little is left to be rounded
     sizes = p.size.reshape(width, -1, p.u0.size)
-    return np.asarray((share[:, None] * sizes).reshape(p.size.shape))
+    return np.asarray((part[:, None] * sizes).reshape(p.size.shape))
 
 
 def misplaced(p: Pieces, seg: Segments, at_ends: Array) -> tuple[Ints, Array]:
