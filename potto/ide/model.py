@@ -269,7 +269,7 @@ class SemanticToken(Struct, frozen=True):
 # The rest
 
 
-class Fold(Struct, frozen=True):
+class Foldable(Struct, frozen=True):
     """Something to fold, from the end of its first line to the end of `span`."""
 
     span: Span

@@ -150,6 +150,7 @@ class FunctionLike(Protocol):
 
 
 Value = Union[Cell, "tuple[Value, ...]", "list[Value]", Rows, FunctionLike]
+Env = dict[str, Value]  # what the free names of a term stand for
 
 
 def listed(items: Sequence[Value]) -> Value:

@@ -35,7 +35,6 @@ from potto.types.types import Diffeo
 from potto.types.types import Function as FunctionType
 
 NOWHERE = Span(0, 0)
-Given = tuple[tuple[tuple[Any, ...], dict[str, Any]], ...]  # per call the arguments by place and by name
 NOTHING: Mapping[str, Any] = MappingProxyType({})
 _texts = itertools.count(1)
 # Modules of texts that import nothing, by folder, name and text: what a cell of a notebook that is run again need not

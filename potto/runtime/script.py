@@ -17,7 +17,7 @@ from potto.checking.spoiled import statement_errors
 from potto.diagnostics import Diagnostic, PottoError, declare
 from potto.elaborate import elaborate_expression
 from potto.integrate.events import DIVERGENT, ROUGH, UNDEFINED
-from potto.kernels.cells import Rows, Value
+from potto.kernels.cells import Env, Rows, Value
 from potto.kernels.errors import wrong_call
 from potto.modules import statements
 from potto.modules.misread import moved
@@ -39,7 +39,6 @@ NOT_CONVERGED = declare("P0501", "an estimate that is not as accurate as was ask
 NO_NUMBER = declare("P0524", "an answer that is not a number", "warning")
 ONE_SIDED = declare("P0522", "a derivative that differs on the two sides of the parameters", "info")
 
-Environment = dict[str, Value]
 Types = tuple[tuple[str, Type], ...]  # of the names of an environment
 
 
@@ -79,7 +78,7 @@ class Script:
                 yield failure.located
                 return
 
-    def statement(self, statement: nodes.Statement, env: Environment) -> Iterator[Shown | Located]:
+    def statement(self, statement: nodes.Statement, env: Env) -> Iterator[Shown | Located]:
         match statement:
             case nodes.Print(arguments=arguments, span=span):
                 yield from self.show(span, arguments, env)
@@ -94,7 +93,7 @@ class Script:
             case nodes.Binding():
                 self.bind(statement, env)
 
-    def show(self, span: Span, arguments: tuple[nodes.Expr, ...], env: Environment) -> Iterator[Shown | Located]:
+    def show(self, span: Span, arguments: tuple[nodes.Expr, ...], env: Env) -> Iterator[Shown | Located]:
         texts: list[str] = []
         estimates: list[Estimate] = []
         kept: Value | None = None
@@ -110,7 +109,7 @@ class Script:
                 yield from (Located(self.file, d) for d in remarks(estimate, place))
         yield Shown(span.shift(self.start), " ".join(texts), tuple(estimates), kept)
 
-    def items(self, iterable: nodes.Expr, env: Environment) -> list[Value]:
+    def items(self, iterable: nodes.Expr, env: Env) -> list[Value]:
         value, _ = self.value(iterable, env)
         if isinstance(value, Rows):
             return value.rows()
@@ -118,7 +117,7 @@ class Script:
             return value
         raise self.failed(wrong_call("a loop goes over an array"), iterable.span)
 
-    def bind(self, binding: nodes.Binding, env: Environment) -> None:
+    def bind(self, binding: nodes.Binding, env: Env) -> None:
         value, _ = self.value(binding.value, env)
         targets = binding.targets
         types = _parts(self.type(binding.value), len(targets))
@@ -132,7 +131,7 @@ class Script:
             raise self.failed(complaint, binding.span)
         env.update({target.name: part for target, part in zip(targets, parts, strict=True)})
 
-    def value(self, expr: nodes.Expr, env: Environment) -> tuple[Value, Estimate | None]:
+    def value(self, expr: nodes.Expr, env: Env) -> tuple[Value, Estimate | None]:
         """The value of an expression, with what it cost; None for what is not a number."""
         machine = self.program.machine(self.settings)
         place = expr.span
@@ -163,7 +162,7 @@ class Script:
 
 
 def evaluate_in(
-    db: Database, file: str, expr: nodes.Expr, env: Environment, program: Program, machine: Machine, types: Types
+    db: Database, file: str, expr: nodes.Expr, env: Env, program: Program, machine: Machine, types: Types
 ) -> tuple[Value, bool]:
     """The value of an expression that may use the file's names and those of an environment, which are of `types`, and
     whether it is that of a derivative. Raises PottoError."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 from potto.diagnostics import Diagnostic
 from potto.syntax import kinds
 from potto.syntax.messages import Stop, describe
-from potto.syntax.repair import Edit
+from potto.syntax.repair import RepairStep
 
 OF_LINES = (kinds.LAST_LINE.code, kinds.NOT_A_NAME.code, kinds.DEFINITION_HEAD.code)
 """What is said of a whole line, or head, because something in it was not understood."""
@@ -30,7 +30,7 @@ class Told:
     def all(self) -> list[Diagnostic]:
         return self.of_tokens + self.stops
 
-    def stopped(self, stop: Stop, edits: list[Edit]) -> None:
+    def stopped(self, stop: Stop, edits: list[RepairStep]) -> None:
         """The grammar stopped, and is repaired like this to go on."""
         if not stop.at.text:
             self._without_differential(stop)

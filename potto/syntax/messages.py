@@ -14,7 +14,7 @@ from potto.diagnostics import Diagnostic, Related
 from potto.source import Span
 from potto.syntax import kinds
 from potto.syntax.habits import arrow_before_body, loop_hint, tuple_without_parentheses
-from potto.syntax.repair import Edit
+from potto.syntax.repair import RepairStep
 from potto.syntax.suggesting import write
 from potto.syntax.tokens import RESERVED, Token
 from potto.syntax.unknown import reserved_word
@@ -126,12 +126,12 @@ _PARTS: tuple[tuple[str, tuple[str, ...], str, str], ...] = (
 """What is missing, within which construct, and what to say of it."""
 
 
-def describe(stop: Stop, edits: list[Edit]) -> Diagnostic:
+def describe(stop: Stop, edits: list[RepairStep]) -> Diagnostic:
     """The message for a stop that was repaired by `edits` (empty if it could not be)."""
     special = _special(stop)
     if special is not None:
         return special
-    edit = edits[0] if edits else Edit("delete", stop.at.kind)
+    edit = edits[0] if edits else RepairStep("delete", stop.at.kind)
     if edit.action == "replace":
         return _replaced(stop, edit)
     if edit.action == "insert":
@@ -267,7 +267,7 @@ def _from(opened: Token) -> tuple[Related, ...]:
     return (Related(opened.span, f"this `{opened.text}`"),)
 
 
-def _replaced(stop: Stop, edit: Edit) -> Diagnostic:
+def _replaced(stop: Stop, edit: RepairStep) -> Diagnostic:
     at = stop.at
     if at.kind == "EQ" and stop.before is not None and stop.before == stop.continues:
         return kinds.INDENTATION(

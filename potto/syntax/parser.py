@@ -14,9 +14,9 @@ from potto.diagnostics import Diagnostic
 from potto.quick import quick, value
 from potto.source import Span
 from potto.syntax import kinds
+from potto.syntax.automaton import Automaton
 from potto.syntax.chunks import split
 from potto.syntax.consequences import Told, only, without_consequences
-from potto.syntax.engine import Engine
 from potto.syntax.foreign_integrals import foreign_integral
 from potto.syntax.foreign_records import declared_elsewhere, in_braces
 from potto.syntax.groups import Context
@@ -25,7 +25,7 @@ from potto.syntax.lexer import MAX_LENGTH, Lexed, lex
 from potto.syntax.messages import Stop
 from potto.syntax.nesting import MAX_NESTING
 from potto.syntax.nodes import BrokenItem, Definition, ErrorExpr, Expr, Item
-from potto.syntax.repair import Edit, find_repair
+from potto.syntax.repair import RepairStep, find_repair
 from potto.syntax.tokens import FIRST_NAME, RESERVED, Comment, Token
 from potto.syntax.walk import deeper_than, extent
 
@@ -159,13 +159,15 @@ def _sorted(diagnostics: list[Diagnostic]) -> tuple[Diagnostic, ...]:
 def _parse(lexed: Lexed, text: str, start: str, diffeo: bool = False) -> _Parse:
     """Run the automaton to the end, repairing as it goes; None as value if it had to give up."""
     tokens, told = lexed.tokens, Told(lexed.diagnostics, len(text))
-    engine = Engine(Context(text, diffeo), start)
-    index = engine.run(tokens, 0)
+    automaton = Automaton(Context(text, diffeo), start)
+    index = automaton.run(tokens, 0)
     first_stop: Stop | None = None
     for _ in range(MOST_ERRORS):
         if index >= len(tokens):
-            return _Parse(engine.result, tokens, told.and_of_trees(engine.context.diagnostics), first_stop, told.stops)
-        stop, engine, edits = _stopped(engine, tokens, index, Context(text, diffeo))
+            return _Parse(
+                automaton.result, tokens, told.and_of_trees(automaton.context.diagnostics), first_stop, told.stops
+            )
+        stop, automaton, edits = _stopped(automaton, tokens, index, Context(text, diffeo))
         first_stop = first_stop or stop
         foreign = habit(stop)
         if foreign is not None:
@@ -174,21 +176,21 @@ def _parse(lexed: Lexed, text: str, start: str, diffeo: bool = False) -> _Parse:
         if edits is None:
             break
         tokens = _patched(tokens, stop.index, edits)
-        index = engine.run(tokens, stop.index)
+        index = automaton.run(tokens, stop.index)
     return _Parse(None, tokens, told.all, first_stop, told.stops)
 
 
 def _stopped(
-    engine: Engine, tokens: list[Token], index: int, context: Context
-) -> tuple[Stop, Engine, list[Edit] | None]:
+    automaton: Automaton, tokens: list[Token], index: int, context: Context
+) -> tuple[Stop, Automaton, list[RepairStep] | None]:
     """A stop at `index`, with an automaton that stands where its repair begins."""
     text = context.text
     if len(tokens) > LONG or index == 0:
-        edits = find_repair(engine.tables, engine.end, tokens, index, engine.states, None)
-        return Stop(engine.values[:], engine.possible(), tokens, index, text), engine, edits
+        edits = find_repair(automaton.tables, automaton.end, tokens, index, automaton.states, None)
+        return Stop(automaton.values[:], automaton.possible(), tokens, index, text), automaton, edits
     # The token without an action has already led to reductions, after which less can follow than before. Read again, up
     # to where it had not been seen; and note the state before the word ahead of it, which may be what is wrong.
-    again = Engine(context, engine.start)
+    again = Automaton(context, automaton.start)
     again.run(tokens[: index - 1], 0)
     behind = Stop(again.values[:], again.possible(), tokens, index - 1, text)
     states = again.states[:]
@@ -196,13 +198,13 @@ def _stopped(
     edits = find_repair(again.tables, again.end, tokens, index, again.states, states)
     if not edits or not edits[0].back:
         return Stop(again.values[:], again.possible(), tokens, index, text), again, edits
-    before = Engine(context, engine.start)
+    before = Automaton(context, automaton.start)
     context.diagnostics.clear()
     before.run(tokens[: index - 1], 0)
     return behind, before, edits
 
 
-def _patched(tokens: list[Token], index: int, edits: list[Edit]) -> list[Token]:
+def _patched(tokens: list[Token], index: int, edits: list[RepairStep]) -> list[Token]:
     """The tokens with a repair at `index` made in them."""
     out = tokens[:index]
     for edit in edits:
@@ -244,10 +246,10 @@ def _salvage(text: str, tokens: list[Token], diffeo: bool) -> Item:
         return Definition(Span(tokens[0].start, end), name, tokens[0].span, (), None, (), hole, False)
     head = _head(tokens)
     if head:
-        engine = Engine(Context(text, diffeo), "chunk")
+        automaton = Automaton(Context(text, diffeo), "chunk")
         tail = [Token("NAME", "", end, end), Token("$END", "", end, end)]
-        if engine.run(head + tail, 0) == len(head) + 2 and isinstance(engine.result, Definition):
-            return engine.result
+        if automaton.run(head + tail, 0) == len(head) + 2 and isinstance(automaton.result, Definition):
+            return automaton.result
     return BrokenItem(Span(0, end), name)
 
 

@@ -60,7 +60,7 @@ _GO_BACK = 3
 """What it costs more to change the word before the place where the parse stopped: a stray `if` shows only after it."""
 
 
-class Edit(NamedTuple):
+class RepairStep(NamedTuple):
     """One step of a repair: insert a token of `kind`, delete the next one, read it as `kind`, or take it as it is."""
 
     action: Literal["insert", "delete", "replace", "shift"]
@@ -70,8 +70,8 @@ class Edit(NamedTuple):
 
 
 _STRAY = frozenset({"SUM", "LET", "IF", "LAMBDA", "FOR", "DIFFEO"})
-_EMPTY_GROUP = Edit("insert", "LPAR")
-_Trail = tuple[Edit, "_Trail | None"]
+_EMPTY_GROUP = RepairStep("insert", "LPAR")
+_Trail = tuple[RepairStep, "_Trail | None"]
 """The steps of a repair so far, last first; shared between the branches of the search."""
 
 
@@ -87,7 +87,7 @@ class _Branch(NamedTuple):
     stack: Stack
     at: int
     run: int
-    edit: Edit | None
+    edit: RepairStep | None
     trail: _Trail | None
 
 
@@ -101,7 +101,9 @@ class _Search:
         self.seen: set[tuple[int, int, int, bool]] = set()
         self.stacks: dict[tuple[int, int], Stack] = {}
 
-    def push(self, cost: int, stack: Stack, index: int, run: int, edit: Edit | None, trail: _Trail | None) -> None:
+    def push(
+        self, cost: int, stack: Stack, index: int, run: int, edit: RepairStep | None, trail: _Trail | None
+    ) -> None:
         self.count += 1
         heapq.heappush(self.queue, _Branch(cost, -index, self.count, stack, index, run, edit, trail))
 
@@ -128,7 +130,7 @@ class _Search:
         """The stack with a state on it; equal stacks are one object, so that their identity tells them apart."""
         return self.stacks.setdefault((id(below), state), (state, below))
 
-    def edited(self, stack: Stack, edit: Edit) -> Stack | None:
+    def edited(self, stack: Stack, edit: RepairStep) -> Stack | None:
         """The stack after an insertion or a replacement."""
         after = self.advance(stack, edit.kind)
         if after is not None and edit == _EMPTY_GROUP:
@@ -140,11 +142,11 @@ class _Search:
         token = self.tokens[index]
         if token.kind not in _STRAY or not any(token.text for token in self.tokens[index + 1 : index + 1 + ENOUGH]):
             return  # nothing follows: it is being typed
-        self.push(_GO_BACK + _DELETE_OTHER, stack, index + 1, 0, Edit("delete", token.kind, True), None)
+        self.push(_GO_BACK + _DELETE_OTHER, stack, index + 1, 0, RepairStep("delete", token.kind, True), None)
         if token.text in KEYWORDS:
-            self.push(_GO_BACK + _REPLACE, stack, index + 1, 0, Edit("replace", "NAME", True), None)
+            self.push(_GO_BACK + _REPLACE, stack, index + 1, 0, RepairStep("replace", "NAME", True), None)
 
-    def run(self) -> list[Edit] | None:
+    def run(self) -> list[RepairStep] | None:
         for _ in range(MOST_STEPS):
             if not self.queue:
                 return None
@@ -168,7 +170,7 @@ class _Search:
             if after is not None:
                 if token.kind == "$END":
                     return _edits(trail)
-                shift = Edit("shift", token.kind)
+                shift = RepairStep("shift", token.kind)
                 self.push(branch.cost, after, branch.at + 1, branch.run + 1, None, (shift, trail))
             if after is None or branch.run == 0:
                 self._branch(branch.cost, stack, branch.at, deleted, trail, token)
@@ -181,14 +183,14 @@ class _Search:
             # Insertions come before deletions at one place, or each pair would be tried in both orders.
             for kind, price in _INSERT.items():
                 if kind in row:
-                    self.push(cost + price, stack, index, 0, Edit("insert", kind), trail)
+                    self.push(cost + price, stack, index, 0, RepairStep("insert", kind), trail)
         if token.kind == "$END":
             return
         instead = _instead(token)
         if instead is not None and instead in row:
-            self.push(cost + _REPLACE, stack, index + 1, 0, Edit("replace", instead), trail)
+            self.push(cost + _REPLACE, stack, index + 1, 0, RepairStep("replace", instead), trail)
         price = _DELETE.get(token.kind, _DELETE_OTHER) if token.text or token.kind != "LPAR" else 1
-        self.push(cost + price, stack, index + 1, 0, Edit("delete", token.kind), trail)
+        self.push(cost + price, stack, index + 1, 0, RepairStep("delete", token.kind), trail)
 
 
 def _instead(token: Token) -> str | None:
@@ -200,8 +202,8 @@ def _instead(token: Token) -> str | None:
     return None
 
 
-def _edits(trail: _Trail | None) -> list[Edit]:
-    edits: list[Edit] = []
+def _edits(trail: _Trail | None) -> list[RepairStep]:
+    edits: list[RepairStep] = []
     while trail is not None:
         edits.append(trail[0])
         trail = trail[1]
@@ -213,7 +215,7 @@ def _edits(trail: _Trail | None) -> list[Edit]:
 
 def find_repair(
     tables: Tables, end: int, tokens: list[Token], index: int, states: list[int], before: list[int] | None
-) -> list[Edit] | None:
+) -> list[RepairStep] | None:
     """The cheapest repair for the token at `index`, or None if none is near.
 
     `states` are those in which it can't be read; `before`, if they are known, those before the token ahead of it.

@@ -13,6 +13,7 @@ from collections.abc import Callable
 from msgspec.structs import replace as changed
 
 from potto.diagnostics import Diagnostic, Replacement
+from potto.modules.free import Reference
 from potto.modules.lookup import DefinitionTarget
 from potto.quick import replace
 from potto.syntax import nodes
@@ -22,7 +23,6 @@ from potto.types.interfaces import Interface
 from potto.types.types import REAL, Function, Parameter, TupleOf, resolve
 from potto.types.unify import NUMBERS, rebuild
 
-Reference = tuple[str | None, str]
 # Letters of a private area, which stand in no program that the parser takes: of a parameter its place and its function.
 _SIGN = re.compile("\ue000([0-9]+)\ue001([^\ue000\ue001\ue002]*)\ue001([^\ue000\ue001\ue002]*)\ue002")
 _LEFT = re.compile("[\ue000\ue001\ue002]")

@@ -18,13 +18,13 @@ from potto.types import kinds
 from potto.types.context import Inference
 from potto.types.scope import Member
 
-Reference = nodes.Name | nodes.Member
+Mention = nodes.Name | nodes.Member
 Found = Mapping[DefinitionTarget, tuple[Diagnostic, ...]]
 
 
 def endless(items: Mapping[DefinitionTarget, Node], inferences: Mapping[DefinitionTarget, Inference]) -> Found:
     """The messages, per definition, about recursion outside of any plain condition."""
-    needs: dict[DefinitionTarget, dict[DefinitionTarget, Reference]] = {}
+    needs: dict[DefinitionTarget, dict[DefinitionTarget, Mention]] = {}
     for target, item in items.items():
         for reference, needed in _unguarded(item, inferences[target]):
             needs.setdefault(target, {}).setdefault(needed, reference)
@@ -37,7 +37,7 @@ def endless(items: Mapping[DefinitionTarget, Node], inferences: Mapping[Definiti
     return found
 
 
-def _unguarded(item: Node, inference: Inference) -> Iterator[tuple[Reference, DefinitionTarget]]:
+def _unguarded(item: Node, inference: Inference) -> Iterator[tuple[Mention, DefinitionTarget]]:
     """The references to definitions of the group outside of the branches of plain conditionals."""
     stack: list[Node] = [item]
     while stack:
@@ -52,7 +52,7 @@ def _unguarded(item: Node, inference: Inference) -> Iterator[tuple[Reference, De
         stack.extend(reversed(children(node)))
 
 
-def _message(target: DefinitionTarget, reference: Reference, needed: DefinitionTarget, item: Node) -> Diagnostic:
+def _message(target: DefinitionTarget, reference: Mention, needed: DefinitionTarget, item: Node) -> Diagnostic:
     what = "itself" if needed == target else f"`{needed.name}`, which needs it,"
     function = not isinstance(item, nodes.Definition) or bool(item.groups)
     help = (

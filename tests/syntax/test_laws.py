@@ -21,7 +21,7 @@ from potto.syntax import (
     split,
     tokenize,
 )
-from potto.syntax.engine import Engine
+from potto.syntax.automaton import Automaton
 from potto.syntax.groups import Context
 from potto.syntax.lexer import lex
 from potto.syntax.nodes import Paren
@@ -138,7 +138,7 @@ class TestAgainstLark:
         return True
 
     def ours(self, tokens: list[Any]) -> bool:
-        return Engine(Context("", False), "chunk").run(tokens, 0) == len(tokens)
+        return Automaton(Context("", False), "chunk").run(tokens, 0) == len(tokens)
 
     @pytest.mark.parametrize("name", SAMPLES)
     def test_samples_and_what_is_left_of_them(self, name: str) -> None:

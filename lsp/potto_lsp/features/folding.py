@@ -29,7 +29,7 @@ def _part(db: Database, text: str, diffeo: bool) -> Part:
     return part_of(fold for fold in found if fold["endLine"] > fold["startLine"])
 
 
-def _lines(text: Text, fold: ide.Fold) -> protocol.FoldingRange:
+def _lines(text: Text, fold: ide.Foldable) -> protocol.FoldingRange:
     first, last = text.position(fold.span.start)[0], text.position(fold.span.end)[0]
     return {"startLine": first, "endLine": last, "kind": KINDS[fold.kind]}
 

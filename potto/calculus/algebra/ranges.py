@@ -20,6 +20,8 @@ from potto.primitives.bounds import between_turns
 from potto.primitives.registry import Primitive
 from potto.primitives.walking import Domain
 
+Box = Mapping[str, tuple[float, float]]  # of each variable the lowest and the highest value
+
 
 class Range(Struct, frozen=True):
     """Values lie in [lo, hi]; `zero` says whether 0 may be one of them (exp never is)."""

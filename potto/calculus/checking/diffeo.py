@@ -13,6 +13,7 @@ from functools import lru_cache
 from msgspec import Struct
 from msgspec.structs import replace
 
+from potto.calculus.algebra.ranges import Box
 from potto.calculus.checking.conditions import Condition, called_by, conditions_of, has_conditions, skeleton
 from potto.calculus.checking.map_shapes import many, unknown_call, wrong_shape
 from potto.calculus.checking.solvability import (
@@ -62,7 +63,6 @@ from potto.syntax import nodes
 from potto.syntax.walk import walk
 from potto.types import check_definition, interface
 
-Box = Mapping[str, tuple[float, float]]
 _Bounds = tuple[tuple[str, tuple[float, float]], ...]
 
 

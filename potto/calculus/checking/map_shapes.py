@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
+from potto.calculus.algebra.ranges import Box
 from potto.calculus.checking.solvability import COMPONENTS, NO_INVERSE, NOT_DIFFERENTIABLE, Problem, kinks
 from potto.calculus.solving.inverse_map import listed
 from potto.core.printer import format_term
 from potto.core.terms import App, Term, postorder
-
-Box = Mapping[str, tuple[float, float]]
 
 
 def wrong_shape(components: Sequence[Term], variables: Sequence[str], box: Box) -> Problem | None:

@@ -9,13 +9,13 @@ one.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Literal
 
 from msgspec import Struct
 
 from potto.calculus.algebra.affine import determinant
-from potto.calculus.algebra.ranges import ranges
+from potto.calculus.algebra.ranges import Box, ranges
 from potto.calculus.algebra.rational_form import is_zero
 from potto.calculus.differentiation.derivative import NotSmooth, partial
 from potto.calculus.solving.enclosable import searchable
@@ -34,8 +34,6 @@ COMPONENTS = declare("P0404", "a diffeomorphism with the wrong number of compone
 NOT_DIFFERENTIABLE = declare("P0405", "a diffeomorphism that is not differentiable")
 MEASURE_ZERO = declare("P0406", "a condition that holds on no area", "warning")
 SEARCHED = declare("P0616", "a surface that is searched for", "hint")
-
-Box = Mapping[str, tuple[float, float]]
 
 
 class Problem(Struct, frozen=True):

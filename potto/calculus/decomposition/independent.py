@@ -8,10 +8,9 @@ from __future__ import annotations
 import math
 from functools import lru_cache
 
-from potto.calculus.decomposition.elimination import factors, summands
+from potto.calculus.decomposition.elimination import Names, factors, summands
 from potto.core.terms import ONE, Const, Delta, Integral, Prim, Term, add, integral, mul, postorder, prim
 
-Names = frozenset[str]
 # About how many nodes a variable takes, with ends and without; up to which product of them one rule for all variables,
 # which is made and called once, is no slower.
 WITH_ENDS, ENDLESS, FEW = 20, 300, 1000

@@ -9,9 +9,8 @@ An inner integral that does not vary with the variables around it stays: it is o
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 from potto.calculus.inlining.currying import arguments_of, sizes_of, uncurry
+from potto.calculus.inlining.expand import Resolve
 from potto.calculus.surfaces.trace import spine
 from potto.core.binders import apart
 from potto.core.terms import (
@@ -31,7 +30,6 @@ from potto.core.terms import (
     substitute,
 )
 
-Resolve = Callable[[Global], "Term | None"]
 MOST_CALLS = 20  # calls behind calls that are looked into
 
 

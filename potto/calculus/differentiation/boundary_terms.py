@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from msgspec import Struct
 
 from potto.calculus.algebra.radicals import NAN
+from potto.calculus.algebra.ranges import Box
 from potto.calculus.algebra.rational_form import is_zero
 from potto.calculus.differentiation.between import between, scaled
 from potto.calculus.differentiation.derivative import partial, total, vanishes, zero_like
@@ -22,7 +23,6 @@ from potto.calculus.solving.pivots import Root, chosen, conjunction, pivots
 from potto.calculus.solving.solve import factors
 from potto.calculus.surfaces.branch_assignment import (
     NOWHERE,
-    Box,
     Flip,
     Flips,
     Loop,

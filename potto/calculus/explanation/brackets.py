@@ -8,13 +8,13 @@ c + x + 1 > 0.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from fractions import Fraction
 from math import gcd, lcm
 
 from msgspec import Struct
 
-from potto.calculus.algebra.ranges import range_of
+from potto.calculus.algebra.ranges import Box, range_of
 from potto.calculus.algebra.rational_form import as_term, normal
 from potto.core.polynomials import Polynomial, number, shared_by, without
 from potto.core.printer import format_term
@@ -34,7 +34,6 @@ from potto.core.terms import (
     sub,
 )
 
-Box = Mapping[str, tuple[float, float]]  # the ranges of variables
 _ANYWHERE: Box = {}
 
 _MONOMIALS = 6  # of what is written anew between its bounds

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Mapping
 
 from msgspec.structs import replace
 
-from potto.calculus.algebra.ranges import range_of
+from potto.calculus.algebra.ranges import Box, range_of
 from potto.calculus.checking.guards import unguarded
 from potto.calculus.differentiation.boundary_terms import at_bounds, at_surfaces, jumps
 from potto.calculus.differentiation.deltas import without_deltas
@@ -28,7 +28,7 @@ from potto.calculus.explanation.symbols import NoFormula, Rewrite, Words, over_f
 from potto.calculus.inlining.expand import Resolve, heads_of
 from potto.calculus.solving.pivots import NoClosedForm, Root, pivots
 from potto.calculus.solving.solve import factors
-from potto.calculus.surfaces.branch_assignment import Box, box_of, branches_of, with_index
+from potto.calculus.surfaces.branch_assignment import box_of, branches_of, with_index
 from potto.calculus.surfaces.branch_assignment import unguarded as where_it_exists
 from potto.calculus.surfaces.branch_cuts import opened
 from potto.calculus.surfaces.case_split import unnested

@@ -13,7 +13,7 @@ from math import gcd, inf, isfinite, isqrt, lcm, prod, ulp
 
 from msgspec import Struct
 
-from potto.calculus.algebra.ranges import Range, range_of
+from potto.calculus.algebra.ranges import Box, Range, range_of
 from potto.calculus.algebra.rational_form import Rational, normal
 from potto.calculus.explanation.alternatives import in_one
 from potto.calculus.explanation.brackets import Condition, between, conditions, fewer, opposite, plainer
@@ -54,7 +54,6 @@ from potto.core.terms import (
     with_integrand,
 )
 
-Box = Mapping[str, tuple[float, float]]
 _Binder = Integral | Sum | Array | Fold
 _ARITHMETIC = ("add", "neg", "mul", "div", "pow", "sqrt", "exp")
 _DIGITS = 15  # of a number that may have been rounded

@@ -11,7 +11,8 @@ from collections.abc import Callable, Mapping
 from msgspec import Struct
 
 from potto.calculus.algebra.radicals import NAN
-from potto.calculus.explanation.readable import Box, Progress, in_decimals, readable
+from potto.calculus.algebra.ranges import Box
+from potto.calculus.explanation.readable import Progress, in_decimals, readable
 from potto.calculus.surfaces.trace import spine
 from potto.core.printer import LEFT_OUT, format_term
 from potto.core.simplify import simplify

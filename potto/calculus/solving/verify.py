@@ -16,6 +16,7 @@ from msgspec import Struct
 
 from potto.calculus.algebra.affine import affine
 from potto.calculus.algebra.point_values import points, sample_value
+from potto.calculus.algebra.ranges import Box
 from potto.calculus.algebra.rational_form import equal
 from potto.calculus.solving.isolate import Guard
 from potto.core.terms import ONE, ZERO, Const, Prim, Term, const, if_, postorder, prim, sub, substitute, transform, var
@@ -29,8 +30,6 @@ _EXACT = 1e-20
 # A number in the text with this many digits or more stands for one that it is not, such as sqrt(2).
 _ROUNDED_DIGITS = 13
 _ROUNDED = 1e-12
-
-Box = Mapping[str, tuple[float, float]]
 
 
 class Verified(Struct, frozen=True):

@@ -6,12 +6,12 @@ just left and just right of it, every other branch as it falls.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 
 from msgspec import Struct
 
 from potto.calculus.algebra.radicals import NAN
-from potto.calculus.algebra.ranges import range_of
+from potto.calculus.algebra.ranges import Box, range_of
 from potto.calculus.algebra.rational_form import as_term, is_zero, normal
 from potto.calculus.differentiation.derivative import NotSmooth, partial
 from potto.core.terms import (
@@ -33,7 +33,6 @@ from potto.core.terms import (
     transform,
 )
 
-Box = Mapping[str, tuple[float, float]]
 NOWHERE: Box = {}
 
 

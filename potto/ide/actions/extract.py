@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 from potto.ide.actions.edits import applied, one_file
 from potto.ide.actions.offers import At, Offer, fresh_name, reads
 from potto.ide.model import Change, Edit
-from potto.ide.names.index import Binder
+from potto.ide.names.index import BoundName
 from potto.ide.names.places import ChunkAt, line_start
 from potto.modules import is_recursive
 from potto.source import Span
@@ -70,7 +70,7 @@ class Extraction:
         self.span = extent(path[-1])
         self.text = chunk.text[self.span.start : self.span.end]
 
-    def used(self) -> list[Binder]:
+    def used(self) -> list[BoundName]:
         """The local names that the expression uses and does not bind, in the order of their binders."""
         found = self.chunk.index(self.place.db)
         numbers = {o.binder for o in found.occurrences if o.binder >= 0 and self._inside(o.span)}
@@ -122,7 +122,7 @@ class Extraction:
     def _within(self, span: Span) -> bool:
         return span.start <= self.span.start and self.span.end <= span.end
 
-    def _of_block(self, binder: Binder) -> bool:
+    def _of_block(self, binder: BoundName) -> bool:
         """Whether a name is a parameter or a line of the definition."""
         head = any(p.span.start == binder.span.start for group in self.item.groups for p in group)
         return head or any(t.span == binder.span for b in self.item.bindings for t in b.targets)

@@ -8,7 +8,7 @@ from potto.ide.actions.edits import one_file
 from potto.ide.actions.offers import At, Offer, as_operand, reads
 from potto.ide.actions.quick_fixes import without_binding
 from potto.ide.model import Change, Edit
-from potto.ide.names.index import Index
+from potto.ide.names.index import NameIndex
 from potto.ide.names.places import ChunkAt
 from potto.ide.names.symbols import LocalSymbol, symbol_at
 from potto.source import Span
@@ -52,7 +52,7 @@ def _relative(chunk: ChunkAt, edits: list[Edit]) -> list[Edit]:
     return [Edit(edit.span.shift(-chunk.start), edit.text) for edit in edits]
 
 
-def _captures(names: Index, value: Span, use: Span) -> bool:
+def _captures(names: NameIndex, value: Span, use: Span) -> bool:
     """Whether a name in the value would mean something else at a use."""
     visible = {binder.name: number for number, binder in names.visible(use.start)}
     inside = [o for o in names.occurrences if value.start <= o.span.start and o.span.end <= value.end]

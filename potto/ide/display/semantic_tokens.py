@@ -10,7 +10,7 @@ from collections.abc import Iterator
 
 from potto.ide.model import SemanticToken
 from potto.ide.names.documents import written_kind
-from potto.ide.names.index import Binder, Occurrence
+from potto.ide.names.index import BoundName, Occurrence
 from potto.ide.names.parts import is_part, occurrences
 from potto.ide.names.places import ChunkAt, all_chunks, owner
 from potto.ide.names.symbols import (
@@ -156,7 +156,7 @@ def _unknown(occurrence: Occurrence) -> tuple[str, tuple[str, ...]] | None:
 
 
 def _local(
-    binder: Binder, made: tuple[str, ...], plain: frozenset[str], functions: frozenset[int]
+    binder: BoundName, made: tuple[str, ...], plain: frozenset[str], functions: frozenset[int]
 ) -> tuple[str, tuple[str, ...]]:
     if binder.kind in ("variable", "index"):
         return "variable", (*made, "readonly", *(("integration",) if binder.kind == "variable" else ()))

@@ -26,7 +26,7 @@ NOWHERE = Span(0, 0)
 _WORD = re.compile(r"[^\W\d]\w*")
 
 
-class Binder(Struct, frozen=True):
+class BoundName(Struct, frozen=True):
     """A name that is bound inside a chunk; `scope` is where it can be used."""
 
     name: str
@@ -53,10 +53,10 @@ class Occurrence(Struct, frozen=True):
         return hash((self.span, self.name, self.role, self.binder, self.path))
 
 
-class Index(Struct, frozen=True):
+class NameIndex(Struct, frozen=True):
     """The names of a chunk, in the order of the text."""
 
-    binders: tuple[Binder, ...]
+    binders: tuple[BoundName, ...]
     occurrences: tuple[Occurrence, ...]
     starts: tuple[int, ...]
 
@@ -74,9 +74,9 @@ class Index(Struct, frozen=True):
         """All places of a name that is bound inside."""
         return tuple(o for o in self.occurrences if o.binder == binder)
 
-    def visible(self, offset: int) -> tuple[tuple[int, Binder], ...]:
+    def visible(self, offset: int) -> tuple[tuple[int, BoundName], ...]:
         """The binders in scope at an offset, the innermost of each name."""
-        found: dict[str, tuple[int, Binder]] = {}
+        found: dict[str, tuple[int, BoundName]] = {}
         for number, binder in enumerate(self.binders):
             if binder.scope.start <= offset <= binder.scope.end:
                 before = found.get(binder.name)
@@ -86,7 +86,7 @@ class Index(Struct, frozen=True):
 
 
 @query(keep=8192)
-def index(db: Database, text: str, diffeo: bool) -> Index:
+def index(db: Database, text: str, diffeo: bool) -> NameIndex:
     """The names of a chunk's text."""
     walk = _Walk(text)
     item = parsed(db, text, diffeo).item
@@ -98,7 +98,7 @@ def index(db: Database, text: str, diffeo: bool) -> Index:
             walk.run(parse_expression(live.text).expr)
     found = sorted(walk.occurrences, key=lambda o: o.span)
     unique = tuple(dict.fromkeys(found))
-    return Index(tuple(walk.binders), unique, tuple(o.span.start for o in unique))
+    return NameIndex(tuple(walk.binders), unique, tuple(o.span.start for o in unique))
 
 
 class _Bind(Struct, frozen=True):
@@ -115,7 +115,7 @@ class _Walk:
     def __init__(self, text: str) -> None:
         self.text, self.base = text, 0
         self.end = len(text)
-        self.binders: list[Binder] = []
+        self.binders: list[BoundName] = []
         self.occurrences: list[Occurrence] = []
         self.environment: dict[str, list[int]] = {}
 
@@ -147,7 +147,7 @@ class _Walk:
 
     def binder(self, name: str, span: Span, kind: BinderKind, scope: Span) -> int:
         end = self.end if self.text[scope.end :].strip() == "" else scope.end + self.base
-        self.binders.append(Binder(name, span.shift(self.base), kind, Span(scope.start + self.base, end)))
+        self.binders.append(BoundName(name, span.shift(self.base), kind, Span(scope.start + self.base, end)))
         number = len(self.binders) - 1
         self.add(span, name, "bind", number)
         return number

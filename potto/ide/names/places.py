@@ -11,7 +11,7 @@ from typing import Literal
 
 from msgspec import Struct
 
-from potto.ide.names.index import Index, index
+from potto.ide.names.index import NameIndex, index
 from potto.modules import ChunkRef, chunk_start, chunks, is_diffeo, parsed, source
 from potto.modules.texts import defined_twice, layout, piece
 from potto.query import Database, query
@@ -63,7 +63,7 @@ class ChunkAt(Struct, frozen=True):
         """What it is, without its tree."""
         return sketch(db, self.text, self.diffeo)
 
-    def index(self, db: Database) -> Index:
+    def index(self, db: Database) -> NameIndex:
         """Its names."""
         return index(db, self.text, self.diffeo)
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from msgspec import Struct
 
-from potto.ide.names.index import Binder, Occurrence, call_head
+from potto.ide.names.index import BoundName, Occurrence, call_head
 from potto.ide.names.parts import part_at, split
 from potto.ide.names.places import ChunkAt, chunk_at
 from potto.measures import COMPOSITIONS, MEASURES
@@ -38,7 +38,7 @@ class LocalSymbol(Struct, frozen=True):
 
     chunk: ChunkAt
     number: int
-    binder: Binder
+    binder: BoundName
     prefix: str = ""
 
 

@@ -10,7 +10,7 @@ import os.path
 from potto.ide.actions.imports import exports
 from potto.ide.model import DocumentSymbol, Location, SymbolKind, WorkspaceSymbol
 from potto.ide.names.documents import item_span, name_span, type_text, written_kind
-from potto.ide.names.index import Binder
+from potto.ide.names.index import BoundName
 from potto.ide.names.places import ChunkAt, PieceAt, pieces_of
 from potto.ide.names.symbols import placeless
 from potto.query import Database, query
@@ -99,7 +99,7 @@ def _children(db: Database, chunk: ChunkAt) -> tuple[DocumentSymbol, ...]:
     return tuple(found)
 
 
-def _child_kind(binder: Binder) -> SymbolKind:
+def _child_kind(binder: BoundName) -> SymbolKind:
     match binder.kind:
         case "parameter":
             return "parameter"

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 
 from potto.ide.actions.edits import applied, change_of
 from potto.ide.model import Change, Edit, FileRename, Refused, Renaming
-from potto.ide.names.index import Index, Occurrence, index
+from potto.ide.names.index import NameIndex, Occurrence, index
 from potto.ide.names.parts import occurrences, split
 from potto.ide.names.places import ChunkAt, all_chunks
 from potto.ide.names.symbols import (
@@ -240,7 +240,7 @@ def _wholes(db: Database, chunk: ChunkAt, renamed: dict[Occurrence, str]) -> dic
     return renamed
 
 
-def _captured(before: Index, after: Index, renamed: dict[Occurrence, str]) -> str | None:
+def _captured(before: NameIndex, after: NameIndex, renamed: dict[Occurrence, str]) -> str | None:
     """The first name that does not mean what it meant."""
     if len(before.occurrences) != len(after.occurrences):
         return next(iter(renamed.values()), "")

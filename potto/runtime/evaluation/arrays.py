@@ -13,7 +13,7 @@ from potto.core.terms import Array as ArrayTerm
 from potto.core.terms import lam
 from potto.diagnostics import PottoError, declare
 from potto.kernels import errors
-from potto.kernels.cells import Cell, Number, Rows, Value, all_arrays, listed
+from potto.kernels.cells import Cell, Env, Number, Rows, Value, all_arrays, listed
 from potto.kernels.rows import gathered
 from potto.kernels.whole import SHORT, looked_through
 from potto.runtime.evaluation.functions import Closure, chosen, holds_functions
@@ -25,8 +25,6 @@ RAGGED = declare("P0513", "sizes that do not agree")
 NO_RISE = declare("P0514", "places of a look-up that do not rise")
 
 MOST_ELEMENTS = 100_000_000
-
-Env = dict[str, Value]
 
 
 def array(machine: Machine, term: ArrayTerm, size: Value, env: Env) -> Value:

@@ -14,12 +14,10 @@ from potto.integrate.events import DISAGREE, Events
 from potto.integrate.pieces import still
 from potto.kernels.cells import Cell, Value, map_cells
 from potto.runtime.evaluation.functions import Closure, Derivative
-from potto.runtime.evaluation.machine import Machine
+from potto.runtime.evaluation.machine import Groups, Machine
 from potto.runtime.evaluation.record import Record
 
 SLACK = 1e-8  # of the largest number of the first derivative, beyond what both ways admit
-
-Groups = tuple[tuple[Value, ...], ...]
 
 
 class _ByHand(Exception):

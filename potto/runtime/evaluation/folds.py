@@ -15,7 +15,7 @@ import numpy as np
 from potto.calculus.inlining.reads import beside
 from potto.core.terms import Fold, Lam, Term, function_of, lam
 from potto.diagnostics import PottoError
-from potto.kernels.cells import Cell, Number, Value, all_arrays, map_cells, pad, pattern
+from potto.kernels.cells import Cell, Env, Number, Value, all_arrays, map_cells, pad, pattern
 from potto.kernels.native.stepping import Stepping
 from potto.kernels.whole import looked_through
 from potto.runtime.evaluation.linear import States, along, steps_at_once
@@ -27,8 +27,6 @@ from potto.runtime.evaluation.sums import bounds
 
 STEPS = "steps"  # what a kernel's machine code for folds is kept under
 LEAST = 4096  # steps that it pays to look at all at once where there are more
-
-Env = dict[str, Value]
 
 
 def fold(machine: Machine, term: Fold, lo: Value, hi: Value, start: Value, env: Env) -> Value:

@@ -16,7 +16,7 @@ import numpy as np
 from msgspec import Struct
 
 from potto.core.terms import Fold, Lam
-from potto.kernels.cells import Array, Cell, Rows, Value, all_arrays, all_cells, map_cells, pad, pattern
+from potto.kernels.cells import Array, Cell, Env, Rows, Value, all_arrays, all_cells, map_cells, pad, pattern
 from potto.kernels.tape import Node, linear
 from potto.kernels.whole import UNIT_ROUNDOFF, looked_through
 from potto.runtime.evaluation.machine import Machine
@@ -25,7 +25,6 @@ from potto.runtime.evaluation.steps import carried, spread
 MOST_NUMBERS = 24  # of a state
 MOST_WORK = 1 << 22  # numbers of states, cubed, times steps: matrices are multiplied
 
-Env = dict[str, Value]
 Shape = tuple[int, ...]
 
 

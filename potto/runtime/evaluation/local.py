@@ -12,11 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from potto.kernels.cells import Cell, Number, Value, all_cells, map_cells, pad
+from potto.kernels.cells import Cell, Env, Number, Value, all_cells, map_cells, pad
 from potto.kernels.tape import Node, every_leaf, leaves, linear, pushed
 from potto.runtime.evaluation.machine import Machine
 
-Env = dict[str, Value]
 Run = Callable[[Machine, Env], Value]
 
 

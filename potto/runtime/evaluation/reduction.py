@@ -15,7 +15,7 @@ from msgspec import Struct
 from potto.core.terms import Fold, Prim, Term, Var, const, lam, mul
 from potto.core.walking import substitute
 from potto.integrate.events import OneSidedDerivatives, TwoSided
-from potto.kernels.cells import Array, Cell, Number, Value, all_arrays
+from potto.kernels.cells import Array, Cell, Env, Number, Value, all_arrays
 from potto.kernels.tape import Node, Untaped, linear
 from potto.kernels.whole import LARGEST, UNIT_ROUNDOFF, looked_through
 from potto.primitives import PRIMITIVES
@@ -23,8 +23,6 @@ from potto.runtime.evaluation.kinks import ROUNDING
 from potto.runtime.evaluation.machine import Machine
 
 MOST_POINTS = 1 << 24
-
-Env = dict[str, Value]
 
 
 def reduced(machine: Machine, term: Fold, places: range, start: Value, env: Env) -> Value | None:

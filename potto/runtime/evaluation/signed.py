@@ -15,15 +15,13 @@ from typing import Any
 import numpy as np
 
 from potto.core.terms import Fold, Lam
-from potto.kernels.cells import Cell, Rows, Value, all_cells, map_cells, pad
+from potto.kernels.cells import Cell, Env, Rows, Value, all_cells, map_cells, pad
 from potto.kernels.whole import looked_through
 from potto.runtime.evaluation.machine import Machine
 
 SAMPLES = 6  # of errors: one rounded up always, one away from 0 always, the others at random
 SAFE, SAFE_RANDOM = 2.0, 6.0  # times the largest of the first two, and the mean of the others
 MOST_TANGENTS = 4  # with samples of their own
-
-Env = dict[str, Value]
 
 
 def can_be_sampled(machine: Machine, term: Fold, start: Value) -> bool:

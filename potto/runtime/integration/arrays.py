@@ -19,7 +19,7 @@ from potto.core.terms import Index, Integral, Term, function_of, proj, substitut
 from potto.diagnostics import PottoError, declare
 from potto.integrate.events import OneSidedDerivatives
 from potto.kernels import errors
-from potto.kernels.cells import Cell, Number, Value
+from potto.kernels.cells import Cell, Env, Number, Value
 from potto.kernels.making import making
 from potto.runtime.evaluation.functions import Closure
 from potto.runtime.evaluation.machine import Machine
@@ -28,7 +28,6 @@ from potto.runtime.integration.uncounted import not_found
 
 TOO_LONG = declare("P0515", "a loop under an integral is too long to be written out")
 
-Env = dict[str, Value]
 Read = dict[str, Term]
 
 

@@ -18,7 +18,7 @@ from potto.core.terms import Index, Integral, Prim, Sum, Term, Var, function_of,
 from potto.diagnostics import PottoError
 from potto.integrate.decomposition.culling import Pairs, culls, remaining
 from potto.integrate.pieces import still
-from potto.kernels.cells import Array, Cell, Ints, Rows, Value, all_arrays, combined, map_arrays, map_cells
+from potto.kernels.cells import Array, Cell, Env, Ints, Rows, Value, all_arrays, combined, map_arrays, map_cells
 from potto.kernels.making import making
 from potto.kernels.tape import Edge, Node
 from potto.kernels.whole import UNIT_ROUNDOFF
@@ -32,8 +32,6 @@ from potto.runtime.integration.preparation import filled
 FEW = 512  # pairs, up to which all are evaluated
 PAIRS = 1 << 17  # evaluated together
 SUM = 8 * UNIT_ROUNDOFF
-
-Env = dict[str, Value]
 
 
 def culled(machine: Machine, term: Sum, first: int, last: int, env: Env) -> Value | None:

@@ -1,7 +1,7 @@
 """The LALR automaton: runs the tables over tokens and builds values.
 
-Owns `Engine`. A small driver over lark's tables, since lark's own costs three times as much for each token; the tests
-hold the two against each other. Where no action is left it stops and says where; `repair` finds a way on.
+Owns `Automaton`. A small driver over lark's tables, since lark's own costs three times as much for each token; the
+tests hold the two against each other. Where no action is left it stops and says where; `repair` finds a way on.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ def _reductions() -> tuple[tuple[int, str, Action | None], ...]:
     return tuple(out)
 
 
-class Engine:
+class Automaton:
     """The state of one parse: parallel stacks of states and values."""
 
     __slots__ = ("context", "end", "rows", "start", "states", "tables", "values")
