@@ -7,7 +7,7 @@ follows from it is said here.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from msgspec import Struct
@@ -81,11 +81,11 @@ class Rule(Struct, frozen=True):
         """The integrals over some of the cells."""
         return self._measured(self._raw(env, index, self.asked), index, self.orders)
 
-    def foreseen(self, env: dict[str, Value], index: Ints, others: Sequence[Rule]) -> list[Bools]:
+    def foreseen(self, env: dict[str, Value], index: Ints, others: Sequence[Rule]) -> Iterator[Bools]:
         """For which cells rules with no more nodes than this one would do, by its coefficients."""
         every = zip(self.orders, self.exact, strict=True)
         raw = self._raw(env, index, [MEAN if exact else tuple(range(order)) for order, exact in every])
-        return [other.good(self._measured(raw, index, other.orders)) for other in others]
+        return (other.good(self._measured(raw, index, other.orders)) for other in others)
 
     def _raw(self, env: dict[str, Value], index: Ints, asked: Sequence[tuple[int, ...]]) -> Raw:
         self.machine.count(index.size * self.nodes)

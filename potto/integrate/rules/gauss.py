@@ -119,7 +119,7 @@ def analytic_truncation(size: Array, n: int) -> Array:
     size: of the last three quarters of the n coefficients at least.
     """
     w, end = _quarter(n), size.shape[-1]
-    last, before, first = (size[..., end - (i + 1) * w : end - i * w].sum(axis=-1) for i in range(3))
+    last, before, first = [np.add.reduce(size[..., end - (i + 1) * w : end - i * w], -1) for i in range(3)]
     rate = np.fmin(np.fmax(np.fmax(last / before, np.sqrt(last / first)), 0.0), 1.0) ** (1 / w)
     share = np.fmax(rate ** (AHEAD * n), np.fmin(1.0, (rate * rate - 0.5) / 0.5))
     return 8 * last * share  # type: ignore[no-any-return]

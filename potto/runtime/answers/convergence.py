@@ -104,10 +104,13 @@ def missing(term: Integral, sums: Sums, settings: Settings, env: dict[str, Value
     """The members of a batch of integrals for which it pays to look further: values or derivatives are not as accurate
     as was asked for, and what is off is no speck beside what the others come to. Those that go into one sum are
     measured by it."""
-    gross = None if sums.gross is None else together(env, sums.gross)
-    sums = replace(sums, v=together(env, sums.v), gross=gross)
-    within = allowance(term, sums, settings.rtol)
     out: Bools = np.zeros(sums.v.shape[-1], dtype=bool)
+    whole = together(env, sums.v)
+    if whole is sums.v and _each(sums.v, sums.e, settings.rtol) and _each(sums.t, sums.et, settings.rtol):
+        return out  # as mostly, whatever else would do
+    gross = None if sums.gross is None else together(env, sums.gross)
+    sums = replace(sums, v=whole, gross=gross)
+    within = allowance(term, sums, settings.rtol)
     for number, error in ((sums.v, sums.e), (sums.t, sums.et)):
         size = np.abs(number)
         speck = SPECK * np.max(size, axis=-1, keepdims=True, initial=0.0, where=np.isfinite(size))
@@ -117,6 +120,12 @@ def missing(term: Integral, sums: Sums, settings: Settings, env: dict[str, Value
         fine &= np.isfinite(error)  # of what may be infinite, and may be anything, nothing is known yet
         out |= ~fine.reshape(-1, out.size).all(axis=0)
     return out
+
+
+def _each(numbers: Array, errors: Array, rtol: float) -> bool:
+    """Whether each number is finite and known to this part of it."""
+    size = np.abs(numbers)
+    return bool((errors <= rtol * size).all() and (size < np.inf).all())
 
 
 def rounded(sums: Sums) -> Bools:

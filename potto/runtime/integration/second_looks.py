@@ -104,7 +104,8 @@ def in_another_order(problem: Problem, order: Integral, sums: Sums) -> Sums:
     """
     machine = problem.machine
     spoilt = ((sums.et > machine.rtol * np.abs(sums.t)) & (sums.et > STEEP * sums.e[:, None])).any(axis=(0, 1))
-    spoilt &= ~np.isinf(sums.et).any(axis=(0, 1)) & missing(problem.term, sums, machine.settings, problem.env)
+    if spoilt.any():
+        spoilt &= ~np.isinf(sums.et).any(axis=(0, 1)) & missing(problem.term, sums, machine.settings, problem.env)
     if problem.events.every(Shortfall) or not spoilt.any() or spoilt.sum() > MOST_SPOILT:
         return sums
     index = np.nonzero(spoilt)[0]
