@@ -250,7 +250,7 @@ class Lines:
             curve = self.smooth(second_partial(op, len(args), i, j), local, memo).v
             return None if curve == ZERO else curve
 
-        e = self.total([f"abs({self.product(slope[i], x)})" for i in moving if (x := args[i].e)])
+        e = self.total([self.off(op, args, i, slope[i], x) for i in moving if (x := args[i].e)])
         if self.side and self.directions and PRIMITIVES[op].kinks(*map(var, names)):
             return self.rounded(Scalar(v, e, *self.on_one_side(op, args, bend, lost)), op, args)
         return self.rounded(Scalar(v, e, *self.tangents(op, args, slope, bend, lost)), op, args)
@@ -297,11 +297,11 @@ class Lines:
             if self.rounding and len(parts) > 1:
                 parts = {i: self.let(part, "t") for i, part in parts.items()}
             t.append(self.total(list(parts.values())))
-            bounds = [f"abs({self.product(slope, x)})" for i, slope in slopes.items() if (x := args[i].et[d])]
+            bounds = [self.off(op, args, i, slope, x) for i, slope in slopes.items() if (x := args[i].et[d])]
             for i, x in moving.items():
                 for j in slopes:
                     if (e := args[j].e) and (curve := bend(i, j)):
-                        bounds.append(f"abs({self.product(curve, x, e)})")
+                        bounds.append(self.off(op, args, j, curve, x, e))
             if self.rounding and parts:
                 bounds += self.tangent_rounded(t[-1] or ZERO, exact_slopes(op, args, d), parts, lost)
                 bounds += [
@@ -309,6 +309,11 @@ class Lines:
                 ]
             et.append(self.total(bounds))
         return tuple(t), tuple(et)
+
+    def off(self, op: str, args: Sequence[Scalar], i: int, *factors: str) -> str:
+        """What a builtin is off as its i-th argument is."""
+        size = f"abs({self.product(*factors)})"
+        return size if (op, i) != ("pow", 1) else f"{self.ufunc('support.by_exponent')}({args[0].v}, {size})"
 
     def tangent_rounded(
         self, t: str, exact: list[tuple[str, str]] | None, parts: Mapping[int, str], lost: Losses

@@ -73,9 +73,10 @@ def _of_builtin(node: Prim, args: Sequence[Loss], values: Mapping[Term, str], sl
     rests, rounds = _own(node, names, own, at)
     if all(arg.none for arg in args) and (node.op != "add" or len(args) == 2):
         return Loss(rounds, _sum(rests, at))
+    if node.op == "pow" and (moved := _sum(_all_of(args[1], names[1]), at)):
+        slope = at.product(own, f"{at.ufunc('log')}({names[0]})", moved)
+        rests.append(f"{at.ufunc('support.by_exponent')}({names[0]}, abs({slope}))")
     if node.op == "pow":
-        given = (own, names[0], _sum(_all_of(args[1], names[1]), at) or "0.0")
-        rests.append(f"{at.ufunc('support.by_exponent')}({', '.join(given)})")
         args, names = args[:1], names[:1]
     more = max(len(args) - 2, 0) if node.op == "add" else 0  # sums on the way
     steep = ["1.0"] * len(args) if node.op == "add" else slopes(node)

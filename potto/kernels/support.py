@@ -120,10 +120,10 @@ def beside(surface: Number, tangent: Number, side: float) -> Mask:
     return (surface > 0) | ((surface == 0) & (side * tangent > 0))
 
 
-def by_exponent(power: Number, base: Number, off: Number) -> Number:
-    """What a power is off by what its exponent is: at a base that is not positive this is whole, and so exact."""
-    with np.errstate(all="ignore"):
-        return np.where(np.asarray(base) > 0, np.abs(power * np.log(np.abs(base))) * off, 0.0)
+def by_exponent(base: Number, off: Number) -> Number:
+    """What a power, or its slope, is off by what its exponent is, worked out for a positive base: at one that is not
+    positive exponents are whole, and so exact."""
+    return np.where(np.asarray(base) > 0, off, 0.0)
 
 
 def select_value(mask: Mask, a: Value, b: Value) -> Value:

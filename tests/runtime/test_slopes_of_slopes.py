@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from typing import Any
+
+import numpy as np
 import pytest
 
 import potto
@@ -30,3 +33,21 @@ def test_slope_of_a_slope(name: str, place: float, value: float, slope: float) -
     found = potto.compile(PROGRAM).eval(f"deriv({name})(({place}, 1))")
     assert found.converged
     assert abs(float(found.value) - value) < 1e-13 and abs(float(found.tangent) - slope) < 1e-12
+
+
+@pytest.mark.parametrize("backend", ["numpy", "native"])
+def test_powers_of_a_negative_base_by_an_exponent_that_stands_still(backend: Any) -> None:
+    """x^n with n a parameter is differentiable by x below 0 for whole n: by n, which stands still, it is not. Closed
+    forms, to some roundings. What n - 1 rounds off is nothing there, and errors of such slopes were infinite."""
+    m = potto.compile("def f(x, n) x^n\ndef g(x, n) n*x^(n - 1)\ndef h(x, n) integral [0, 1] (y*x)^(n - 1) d(y)")
+    with potto.settings(backend=backend):
+        second = potto.hessian(m.f, ["x"])(-2.0, 3.0)
+        assert abs(second.value + 12) <= second.error <= 1e-14 and second.converged
+        x, n = np.array([-2.0, -1.0, 2.0]), np.array([3.0, 4.0, 5.0])
+        slope = potto.grad(m.g, ["x"])(x, n)
+        assert np.all(np.abs(slope.tangent - n * (n - 1) * x ** (n - 2)) <= slope.tangent_error)
+        assert (slope.tangent_error <= 2e-15 * np.abs(slope.tangent)).all() and slope.converged
+        inside = potto.grad(m.h, ["x"])(-2.0, 3.0)
+        assert abs(inside.tangent + 4 / 3) <= inside.tangent_error <= 1e-12
+        mixed = potto.hessian(m.f, ["x", "n"])(-2.0, 3.0)
+        assert abs(mixed.value[0, 0] + 12) <= 1e-14 and not mixed.converged and np.isnan(mixed.value[0, 1])
