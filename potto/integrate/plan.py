@@ -242,16 +242,16 @@ def make(
     if outline is None:
         outline, reaches, premises, confused = _outlined(term, asked, found, inline, number, over, outlines)
     term = outline.term
-    inlined = _inlined(term, inline) if reaches and not outline.hides else None
+    body = inlined(term, inline) if reaches and not outline.hides else None
     return Plan(
         outline,
         tuple((t, v) for t, v in asked.decisions.items() if not isinstance(t, Const)),
         reaches,
-        inlined,
-        None if inlined is None else straight(term, inlined, outline.levels),
+        body,
+        None if body is None else straight(term, body, outline.levels),
         _premise(premises),
         confused,
-        () if inlined is None else _degrees(inlined, outline.levels),
+        () if body is None else _degrees(body, outline.levels),
         over,
     )
 
@@ -299,7 +299,7 @@ def _degrees(body: Term, levels: Sequence[LevelPlan]) -> tuple[int | None, ...]:
     return tuple(found)
 
 
-def _inlined(term: Integral, inline: Resolve) -> Term:
+def inlined(term: Integral, inline: Resolve) -> Term:
     """The integrand with calls of known functions carried out."""
     passed = {n.name: f for n in postorder(term.body) if isinstance(n, Var) and (f := inline(n)) is not None}
     return expanded(substitute(term.body, passed), inline)

@@ -228,6 +228,8 @@ def stats_of(record: Record, clock: Clock) -> dict[str, Any]:
         "integrals": record.integrals,
         "evaluations": record.evaluations,
     }
+    if record.seen:
+        stats["integrals without a plan"] = record.seen
     if record.culled:
         stats["integrals culled"] = record.culled
     if record.costs is not None:

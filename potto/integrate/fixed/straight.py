@@ -83,7 +83,7 @@ class Straight(Struct, frozen=True, dict=True, eq=False):
         found = self.faces.get(sides)
         if found is None:
             side = dict(zip(children(self.surfaces.body), sides, strict=True))
-            found = self.faces[sides] = _on_sides(self.body, side)
+            found = self.faces[sides] = on_sides(self.body, side)
         return found
 
     def decided(self, sides: tuple[bool, ...]) -> Straight:
@@ -208,7 +208,7 @@ def _all_sides(body: Term) -> Term:
     return memo[body]
 
 
-def _on_sides(body: Term, sides: Mapping[Term, bool]) -> Term:
+def on_sides(body: Term, sides: Mapping[Term, bool]) -> Term:
     memo: dict[Term, Term] = {}
     for node in postorder(body):
         if isinstance(node, Branch):

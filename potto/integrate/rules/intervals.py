@@ -46,7 +46,7 @@ def _fractional(node: Prim) -> bool:
 def enclosure(terms: tuple[Term, ...], box: Mapping[str, Interval]) -> list[Interval]:
     """Bounds of the values of terms, which are `enclosable`, for variables in a box."""
     with np.errstate(all="ignore"):
-        env = {name: _marked(*ends) for name, ends in box.items()}
+        env = {name: marked(*ends) for name, ends in box.items()}
         known: dict[Term, Interval] = {}
         for node in _order(terms):
             known[node] = INTERVALS.node(node, env, known)
@@ -64,7 +64,7 @@ class _Finite(tuple[Any, Any]):
     __slots__ = ()
 
 
-def _marked(lo: Any, hi: Any) -> Interval:
+def marked(lo: Any, hi: Any) -> Interval:
     """Bounds, with whether they are finite everywhere found out by one sum: infinities and nans stay what they are."""
     both = lo + hi
     finite = math.isfinite(np.add.reduce(both, None) if isinstance(both, np.ndarray) else both)
@@ -79,7 +79,7 @@ class _Intervals(Domain[Interval]):
     """Bounds of batches: arithmetic as below, everything else by the rules of the entries."""
 
     def constant(self, node: Const) -> Interval:
-        return _marked(node.value, node.value)  # nan is what a guard leaves where there is no value
+        return marked(node.value, node.value)  # nan is what a guard leaves where there is no value
 
     def unknown(self) -> Interval:
         return ANYTHING
@@ -147,7 +147,7 @@ def _defined(args: Sequence[Interval], result: tuple[Any, ...], room: Any = ROUN
     if off.__class__ is not float or off:
         below, above = below - off, above + off
     unsure = [a[0] for a in args if a.__class__ is not _Finite]
-    found = _marked(below, above)
+    found = marked(below, above)
     if len(result) == 2 and not unsure and found.__class__ is _Finite:
         return found
     nowhere = (lo == np.inf) | (hi == -np.inf)
@@ -158,7 +158,7 @@ def _defined(args: Sequence[Interval], result: tuple[Any, ...], room: Any = ROUN
     below, above = np.fmax(below, -np.inf), np.fmin(above, np.inf)
     if np.any(nowhere):
         below, above = np.where(nowhere, np.nan, below), np.where(nowhere, np.nan, above)
-    return _marked(below, above)
+    return marked(below, above)
 
 
 def _add(node: Prim, args: list[Interval]) -> Interval:

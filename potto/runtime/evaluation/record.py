@@ -113,7 +113,7 @@ class Record(Struct):
     met: how often something was met that has two derivatives; taped: what it moves with on a tape, if there is one, as
     nodes and the members of these.
     within: the error up to which what cancels is 0 as accurately as asked for, of all or of each of the batch.
-    culled: integrals that are 0 for certain, and were not evaluated.
+    culled: integrals that are 0 for certain, and were not evaluated. seen: such as were answered without a plan.
     cells: on how many stretches roots have been looked for; each counts as an evaluation where a budget is asked.
     start, members: how much had been done before what counts, and for how many members this is.
     boxes, most_boxes: in how many boxes places have been searched for, and in how many they may be for each member.
@@ -135,6 +135,7 @@ class Record(Struct):
     most_boxes: int = MOST_BOXES
     integrals: int = 0
     culled: int = 0
+    seen: int = 0
     used: dict[tuple[str, str], Value] = {}
     costs: Costs | None = field(default_factory=costs.books)
     gauge: Gauge | None = field(default_factory=_begun)

@@ -1,6 +1,6 @@
 """What is tried for an integral: variables eliminated, cut along, or sampled, and which of them innermost.
 
-Owns `too_many`, `many`, `orders`, `preferred`, `trial` and `worth_trials`.
+Owns `to_be_seen`, `too_many`, `many`, `orders`, `preferred`, `trial` and `worth_trials`.
 """
 
 from __future__ import annotations
@@ -11,7 +11,8 @@ from collections.abc import Iterable, Iterator
 
 from potto.calculus.decomposition.elimination import eliminate
 from potto.calculus.differentiation.level_sets import placed_along
-from potto.core.terms import Integral, reordered
+from potto.core.terms import Integral, Term, reordered
+from potto.integrate.fixed.at_sight import worth_a_look
 from potto.runtime.integration.problem import Problem
 
 # Up to how many variables iterated quadrature is never in question; what it takes beyond them, in evaluations, and how
@@ -19,6 +20,8 @@ from potto.runtime.integration.problem import Problem
 MOST_LEVELS = 3
 PER_LEVEL, AFFORDABLE = 12, 1_000_000
 LOOSE = 1e-3
+# A look takes as long as an answer by a plan of what has one, 10 ms; the plan takes twenty times that.
+SEEN, MOST_LOOKS = 2, 16
 MET = 4  # one in so many planes that may cut a variable does: half of what it takes to twice that, of polytopes
 FEW_NODES = 30_000  # up to which iterated quadrature is no slower
 # Evaluations that are spent on one order of two variables before another one is tried; how many times those of one
@@ -51,6 +54,17 @@ def expected(problem: Problem) -> int:
         nodes = (PER_LEVEL if degree is None else degree + 1 for degree in plan.degrees)
         return math.prod(n * (1 + len(own.level.cuts) // MET) for n, own in zip(nodes, plan.levels, strict=True))
     return PER_LEVEL**count * 2**plan.doublings  # type: ignore[no-any-return]
+
+
+def to_be_seen(problem: Problem) -> Term | None:
+    """The integrand of one member by itself that is to be looked at before anything is planned for all; else None."""
+    machine = problem.machine
+    if problem.batch > 1 or not problem.outermost or machine.frozen or machine.side:
+        return None
+    if machine.settings.method in ("mc", "qmc") or len(problem.term.variables) != SEEN:
+        return None
+    body = problem.unplanned(MOST_LOOKS)
+    return body if body is not None and worth_a_look(body) else None
 
 
 def orders(term: Integral) -> Iterator[Integral]:

@@ -44,7 +44,7 @@ from potto.runtime.evaluation.functions import Closure
 from potto.runtime.evaluation.linker import Linker
 from potto.runtime.evaluation.machine import Machine
 from potto.runtime.integration.arrays import met
-from potto.runtime.integration.choices import many, preferred
+from potto.runtime.integration.choices import many, preferred, to_be_seen
 from potto.runtime.integration.preparation import filled, placed, prepared
 from potto.runtime.integration.problem import Mixed, Problem, linked
 from potto.runtime.integration.solving import solve
@@ -138,7 +138,8 @@ class Direct(Struct, frozen=True):
             problem = Problem(machine.apart(), term, *linked(env), solve, 1, True)
             if many(problem):
                 return None
-            if problem.on_known_sides() and not problem.flat:  # between planes the rule is by far the shortest way
+            # between planes the rule is by far the shortest way
+            if (problem.on_known_sides() and not problem.flat) or to_be_seen(problem) is not None:
                 raise _Passed
             plan = problem.plan(next(iter(preferred(problem))))
         except (PottoError, Mixed, TooDeep, RecursionError):

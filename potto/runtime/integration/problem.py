@@ -26,7 +26,7 @@ from potto.diagnostics import PottoError
 from potto.integrate.elimination.recursion import Eliminated, eliminated
 from potto.integrate.events import Events
 from potto.integrate.pieces import Sums, still
-from potto.integrate.plan import Plan, make, numbers_in, unpacked_plan
+from potto.integrate.plan import Plan, inlined, make, numbers_in, unpacked_plan
 from potto.kernels.cells import Array, Bools, Cell, Ints, Value, map_arrays
 from potto.kernels.making import making
 from potto.runtime.evaluation.functions import Closure, Derivative
@@ -70,7 +70,8 @@ class Known(Struct):
     """What was found out about an integral and all that it calls: plans, one for each course that it may take; the
     steps that eliminate its variables; the parameters that decide its course; its sides. Empty where nobody has asked.
 
-    key: what it is kept under on disk. packed: the plans as they are kept.
+    key: what it is kept under on disk. packed: the plans as they are kept. written: its integrand with calls carried
+    out, looks: how often it was looked at without a plan.
     """
 
     key: bytes = b""
@@ -79,6 +80,8 @@ class Known(Struct):
     steps: list[Eliminated | None] = []
     deciding: list[frozenset[str]] = []
     sided: list[Sided | None] = []
+    written: list[Term] = []
+    looks: int = 0
 
 
 _known: OrderedDict[Any, Known] = OrderedDict()
@@ -238,6 +241,17 @@ class Problem:
         if self.batch > 1 and not fits.all():  # to rounding it holds for the one that it was made for
             raise Mixed(fits)
         return plan
+
+    def unplanned(self, most: int) -> Term | None:
+        """The integrand with calls carried out, for a look at an integral that has no plan; None where there is one,
+        or it was looked at so often that it pays to make it."""
+        known = self.known
+        if known.plans or known.looks >= most:
+            return None
+        if not known.written:
+            with making:
+                known.written.append(inlined(self.term, self.plain_function))
+        return known.written[0]
 
     def steps(self) -> Eliminated | None:
         """The steps of an integral over many variables that each depend on one number, if it has such; found once."""
