@@ -40,13 +40,16 @@ LEAST = 2048  # members, from which on a batch has blocks: below, the calls for 
 # as many, else with twice as many. What is cut in a block costs a few milliseconds whatever there is of it: 16 blocks
 # of what takes 20 ms in one would take 80. Longer blocks could not be shared evenly; but where a block costs far more
 # than its members (64 pixels whose edges are searched 0.14 s, 1,024 of them 0.4), they are four times as large each
-# time, as long as a member of them costs less than FALLS of what one cost before, and they take less than LONG.
+# time, as long as a member of them costs less than FALLS of what one cost before, and they take less than LONG. Then
+# AHEAD times as large ones are tried in the middle of the batch.
 PILOT, MOST = 1 << 6, 1 << 18
 ENOUGH, LITTLE, LONG = 0.1, 0.005, 1.0
 FALLS = 0.6
 # Seconds, less than which a run may only have been slow because something was made for it: the first one, and one whose
 # members cost so many times what those of fewer did (kernels are made at the size that first needs them).
 COLD, DEARER = 2.0, 2.0
+# How many times as large blocks are tried where those twice as large cost as much; if a batch has so many at least.
+AHEAD, BLOCKS = 8, 64
 TILE = 0.5  # seconds of a tile by the clock, at the most
 SHARES = 4  # tiles a worker gets at least, where there are enough blocks: who is done first takes more
 WORTH = 0.3  # seconds of work from which on others are asked to help; executors may say otherwise, by `worth`
@@ -185,10 +188,41 @@ class _Tiles(Struct):
         if not most and self.spent:  # twice as many take less than twice ENOUGH, and so may all
             while size < self.count and size < MOST and self.spent * self.count <= 2 * ENOUGH * tried:
                 size *= 2
+        if most and self.spent:
+            size = self._further(size)
         if len(_sizes) > MOST_SIZES:
             _sizes.clear()
         _sizes[self.key] = size, most
         return size
+
+    def _further(self, size: int) -> int:
+        """A size at which blocks in the middle of the batch cost far less than at this one, if there is such a size. Of
+        a picture the first rows may be empty; and what is cut at few members of a block is done one by one, at many
+        together, so that what a member costs first stays, and then falls."""
+        while self.spent < LONG and BLOCKS * size <= self.count:
+            first = self.count // (2 * AHEAD * size) * AHEAD * size
+            each = self._again_at((first, first + size)) / size
+            self.tried.append(self.done.pop(first))
+            larger, most = (first, first + AHEAD * size), FALLS * each * AHEAD * size
+            self._alone(larger)
+            if self.spent > most:
+                self._again_at(larger)
+            last = self.done.pop(first)
+            if self.spent > most:
+                self.tried.append(last)
+                break
+            size *= AHEAD
+            self._put_aside()
+            self.done[first] = last
+        return size
+
+    def _again_at(self, block: Part) -> float:
+        """The seconds that a block takes when what it needs was made, by one like it."""
+        if block[0] not in self.done:
+            self._alone(block)
+        self.tried.append(self.done[block[0]])
+        self._alone(block)
+        return self.spent
 
     def _put_aside(self) -> None:
         self.tried += self.done.values()

@@ -193,11 +193,30 @@ def test_blocks_are_large_where_a_block_costs_more_than_its_members(
     for name, seconds in (("ENOUGH", 0.1), ("LONG", 1.0)):
         monkeypatch.setattr(tiles, name, seconds)
 
+    assert size_by(monkeypatch, 25600, lambda members: block + member * members) == size
+
+
+def size_by(monkeypatch: pytest.MonkeyPatch, count: int, seconds: Callable[[int], float]) -> int:
+    """The size of blocks where one takes so many seconds."""
+
     def alone(self: Any, part: tuple[int, int]) -> None:
-        self.spent = block + member * (part[1] - part[0])
+        self.spent = seconds(part[1] - part[0])
+        self.done[part[0]] = None
 
     monkeypatch.setattr(tiles._Tiles, "_alone", alone)
-    assert tiles._Tiles(25600, lambda part: None, lambda parts: None, "key")._size() == size  # type: ignore[arg-type, return-value]
+    return tiles._Tiles(count, lambda part: None, lambda parts: None, count)._size()  # type: ignore[arg-type, return-value]
+
+
+def test_blocks_are_large_where_few_members_cost_as_much_as_many(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Up to ten pixels on edges are done one by one, more together: what a member costs stays, and then falls."""
+    for name, seconds in (("ENOUGH", 0.1), ("LONG", 1.0)):
+        monkeypatch.setattr(tiles, name, seconds)
+
+    def one_by_one(members: int) -> float:
+        return 0.0002 * min(members, 1000) + 1e-5 * members
+
+    assert size_by(monkeypatch, 1 << 16, one_by_one) == 4096
+    assert size_by(monkeypatch, 1 << 14, one_by_one) == 512
 
 
 def test_what_is_made_for_a_larger_block_does_not_count_as_its_members(monkeypatch: pytest.MonkeyPatch) -> None:
