@@ -170,7 +170,7 @@ def pictures(folder: Path, quick: bool) -> list[dict[str, Any]]:
         mesh = fitted(kind, photo, 2 if quick else 7, 1 if quick else 60)
         file = f"stylize-{kind}.png"
         Image.fromarray(drawn(mesh, 32 if quick else 384)).save(folder / file)
-        caption = f"{len(mesh.faces)} triangles of {kind} colour: loss {mesh.losses[0]:.4f} to {mesh.losses[-1]:.4f}"
+        caption = f"{kind} colour: loss {mesh.losses[0]:.4f} to {mesh.losses[-1]:.4f}"
         shown.append({"file": file, "caption": caption, "seconds": mesh.seconds})
     return shown
 
