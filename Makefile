@@ -6,10 +6,12 @@ STAMP := $(VENV)/.stamp
 VSCODE := editors/vscode
 EXTRAS ?= dev
 
+PACKAGES := -c 'import sysconfig; print(sysconfig.get_path("purelib"))'
+
 TORCH ?= torch==2.13.0
 TESTS := $(BIN)/python -m pytest -n auto --maxprocesses 8 --dist worksteal --durations 20
 
-.PHONY: tables docs wheels demo gallery test quick fuzz check format clean native pictures test-bridges hours vsix e2e
+.PHONY: tables docs wheels demo gallery test quick fuzz lint check format clean native pictures test-bridges hours vsix e2e
 
 demo: $(STAMP)  ## the paper's programs, evaluated and differentiated
 	@PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/python examples/demo.py
@@ -36,18 +38,21 @@ test-bridges: $(STAMP)  ## JAX, PyTorch and scipy: installed into .venv (PyTorch
 hours:  ## a stranger's first hours, docs/hour-*.md, in a fresh clone with JAX and PyTorch
 	PYTHON=$(PYTHON) TORCH=$(TORCH) .ci/hours
 
-check: $(STAMP)  ## lints, types, floors
+lint: $(STAMP)  ## lints, types
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check --quiet .
 	$(BIN)/mypy
+
+check: lint  ## lints, types, floors
 	$(BIN)/python -m pytest tests/test_architecture.py
 
 tables: $(STAMP)  ## potto/syntax/tables.json: what the parser reads, of the grammar as it is now
 	$(BIN)/python -c 'from potto.syntax.tables import write; write()'
 
-native:  ## .venv-native: the packages as they stand, with the front end as machine code (needs a C compiler)
-	test -x .venv-native/bin/python || $(PYTHON) -m venv .venv-native
-	HATCH_BUILD_HOOKS_ENABLE=1 .venv-native/bin/python -m pip install -qq --disable-pip-version-check '.[dev]'
+native: $(STAMP)  ## .venv-native: the front end as machine code (needs a C compiler), beside all that .venv has
+	test -x .venv-native/bin/python || $(PYTHON) -m venv --without-pip .venv-native
+	$(BIN)/python $(PACKAGES) >"$$(.venv-native/bin/python $(PACKAGES))/others.pth"
+	HATCH_BUILD_HOOKS_ENABLE=1 $(BIN)/python -m pip --python .venv-native install -qq --disable-pip-version-check --no-deps --force-reinstall .
 
 docs: $(STAMP)  ## the pages as a site in build/site: links and anchors checked, their programs run
 	$(BIN)/python -c 'import material' 2>/dev/null || $(BIN)/python -m pip install -qq --disable-pip-version-check -e '.[docs]'

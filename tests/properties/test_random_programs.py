@@ -43,10 +43,10 @@ def test_programs_of_all_kinds(chunk: int) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("start", range(10_000, 10_000 + examples(40, 840), 40))
+@pytest.mark.parametrize("start", range(10_000, 10_000 + examples(24, 840), 24))
 def test_many_programs_converge_where_nothing_is_awkward(start: int) -> None:
     """Most of them do, and to what was asked for."""
-    counts, wrong = outcomes(range(start, start + 40), lambda number: held(tame(number)))
+    counts, wrong = outcomes(range(start, start + 24), lambda number: held(tame(number)))
     unbounded = [failure for failure in wrong if "inf" in str(failure)]  # the budget was spent, and the answer says so
     assert len(wrong) == len(unbounded) <= (1 if EACH > 9 else 0), "\n".join(map(str, wrong))
-    assert counts["compared"] >= 30, counts
+    assert counts["compared"] >= 18, counts

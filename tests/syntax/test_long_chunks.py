@@ -47,7 +47,7 @@ def test_nothing_but_blanks_changes_and_no_line_stays_too_long(shape: str) -> No
     assert format_source(found) == found
 
 
-@pytest.mark.parametrize("written", ["a{i}+", "a{i}\n    + ", "a * {i} - ", "a/\n    "])
+@pytest.mark.parametrize("written", ["a{i}\n    + ", "a * {i} - "])
 def test_twenty_thousand_terms(written: str) -> None:
     terms = "".join(written.format(i=i % 10) for i in range(20_000))
     found = format_source(f"def f(a)\n    {terms}a\n")
