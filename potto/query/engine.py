@@ -35,10 +35,10 @@ from potto.query.stacks import on_fresh_stack
 
 STEPS: Final = 10
 FEW: Final = 16
-RESTING: Final = 32  # revisions before `Below` is worked out again for leaves below which something changed
+RESTING: Final = 32  # revisions before `Below` is worked out again for other leaves than it was of
 LOGGED: Final = 16  # revisions for which the changes are kept
 LEAVES_FIRST: Final = 8  # that are run early on the way to one memo; after that it is walked
-ONCE: Final = Below((), -FOREVER)  # of a memo that was verified once: it may never be again
+ONCE: Final = Below((), -FOREVER, frozenset())  # of a memo that was verified once: it may never be again
 SEGMENT: Final = 40  # levels of running queries on one thread: with 20 frames each, still below Python's limit
 
 
@@ -171,7 +171,7 @@ class Engine:
                 places[-1] -= 1
                 return stands
         if not stands:
-            durability, deps = DURABILITIES, memo.deps
+            deps = memo.deps
             for place in range(max(places[-1], 0), len(deps)):
                 dep = deps[place]
                 source = dep.source
@@ -189,10 +189,7 @@ class Engine:
                         return source
                 if dep.changed_at > since and not has_returned(dep, since):
                     return True
-            for dep in deps:
-                if dep.durability < durability:
-                    durability = dep.durability
-            memo.durability = durability
+            memo.durability = min([dep.durability for dep in deps], default=DURABILITIES)
             memo.leaves = leaves_of(deps)
         memo.verified_at = revision if memo.durability < DURABILITIES else FOREVER
         if self._logs:
@@ -209,8 +206,9 @@ class Engine:
         since, revision, leaves = memo.verified_at, self.revision, memo.leaves
         if leaves is None or not steps or memo.index >= 0 or memo.provisional or self._last_changed[1] > since:
             return False
-        found = memo.found
-        if found is not None and found.leaves is leaves and found.since == since > revision - LOGGED:
+        found = memo.found or ONCE
+        known = found.leaves is leaves and found.since == since > revision - LOGGED
+        if known:
             below = self._many_stand(memo, found, steps)
             if below is not False:
                 return below
@@ -222,8 +220,10 @@ class Engine:
                     return below
             if leaf.changed_at > since:
                 return False
-        if len(leaves) > self.few and (found is None or found.since < revision - RESTING):
-            memo.found = ONCE if found is None else Below(leaves, revision)
+        if len(leaves) > self.few and (known or found.since < revision - RESTING):
+            later = range(max(since, revision - LOGGED) + 1, revision + 1)
+            changed = found.noisy.union(*[self._changes[each] for each in later])
+            memo.found = ONCE if memo.found is None else Below(leaves, revision, changed)
         return True
 
     def _many_stand(self, memo: Memo, found: Below, steps: int) -> bool | Memo:

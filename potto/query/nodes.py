@@ -231,13 +231,15 @@ class Below:
 
     `nodes` are the leaves and what they depend on in turn. `sources` are the memos among them that read inputs
     themselves: once these are up to date, all changes among the nodes are known. Valid from the revision `since` on, as
-    long as none of the nodes changes.
+    long as none of the nodes changes. What has changed before while the leaves did not is `noisy`, as the text of a
+    file that is edited: it counts as an input, so that what absorbs its changes is among the sources.
     """
 
-    __slots__ = ("leaves", "nodes", "since", "sources")
+    __slots__ = ("leaves", "nodes", "noisy", "since", "sources")
 
-    def __init__(self, leaves: tuple[Leaf, ...], since: int) -> None:
+    def __init__(self, leaves: tuple[Leaf, ...], since: int, changed: frozenset[Node]) -> None:
         self.leaves, self.since = leaves, since
+        noisy = set[Node]()
         nodes: dict[Node, None] = dict.fromkeys(leaves)
         sources: dict[Memo, None] = {}
         seen = set[Memo]()
@@ -251,9 +253,13 @@ class Below:
             if below is None or len(nodes) > MOST_BELOW or None in [node.source for node in below]:
                 sources[source] = None
                 continue
+            if not changed.isdisjoint(below):
+                noisy |= changed.intersection(below)
+                sources[source] = None
+                continue
             todo += [node for node in below if node not in nodes]
             nodes.update(dict.fromkeys(below))
-        self.nodes, self.sources = frozenset(nodes), tuple(sources)
+        self.nodes, self.sources, self.noisy = frozenset(nodes), tuple(sources), frozenset(noisy)
 
 
 def entry_of(memo: Memo, key: Any) -> Entry:

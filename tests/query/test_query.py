@@ -244,6 +244,41 @@ def followed(db: Database, name: str) -> str:
     return name + onward
 
 
+@query(cuts=True)
+def written(db: Database) -> str:
+    return text(db, "base")
+
+
+@query
+def counted(db: Database) -> dict[str, int]:
+    return {word: len(word) for word in written(db).split()}
+
+
+@query(cuts=True)
+def halved(db: Database, key: str) -> int:
+    return (db.entry(counted, (), key) or 0) // 2
+
+
+@query
+def halves(db: Database) -> int:
+    return sum(halved(db, f"w{n:03}") for n in range(200))
+
+
+def test_a_text_that_changes_at_each_edit_is_no_reason_to_look_at_all_that_read_other_parts_of_it() -> None:
+    db = Database()
+    rest = " ".join(f"w{n:03}" for n in range(200))
+    looked: list[int] = []
+    for turn in range(8):
+        db.set_input(("text", "base"), f"{rest} {'x' * turn}")
+        with db.recording() as events:
+            assert halves(db) == 400
+        looked.append(len(events))
+    assert looked[1] > 200  # each of them, at first
+    assert max(looked[3:]) < 8  # then the text and its words alone
+    db.set_input(("text", "base"), rest.replace("w007", "w7"))
+    assert halves(db) == 398
+
+
 def test_durable_memos_are_not_looked_at() -> None:
     db = Database()
     put(db, "library", "a b c", durability=2)
