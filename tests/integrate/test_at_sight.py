@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import potto
+from potto.integrate.costs import counting
 from potto.integrate.fixed import at_sight
 from potto.runtime.integration import choices, problem
 
@@ -114,3 +115,12 @@ def test_what_is_not_plain_is_left_to_plans(disc):
 def test_plans_come_when_they_pay(disc, monkeypatch):
     monkeypatch.setattr(choices, "MOST_LOOKS", 2)
     assert [looked(by(disc.pixel, CORNERED, 4)) for _ in range(3)] == [True, True, False]
+
+
+def test_what_a_look_costs_is_told(disc):
+    with counting():
+        value, slope = disc.pixel(*CORNERED), by(disc.pixel, CORNERED, 4)
+    # a stretch that the edge cuts in two, and one beside it; 121 nodes a cell, two sides of 11 places on the edge
+    for found, why in ((value, "cut along; no derivative is asked for"), (slope, "it moves: it has a boundary term")):
+        assert found.stats["cells"] == 3 and found.stats["interior evaluations"] == 363 == found.evals - 22
+        assert [surface["why"] for surface in found.stats["surfaces"]] == [why]

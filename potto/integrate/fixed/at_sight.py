@@ -20,7 +20,7 @@ import numpy as np
 from msgspec import Struct
 
 from potto.core.terms import Branch, Integral, Term, Tuple, children, postorder
-from potto.integrate.costs import Costs, Surface
+from potto.integrate.costs import Surface
 from potto.integrate.decomposition.root_isolation import flat
 from potto.integrate.fixed.straight import on_sides
 from potto.integrate.pieces import Evaluator, Sums
@@ -113,7 +113,7 @@ def _rectangle(term: Integral, body: Term, machine: Evaluator, env: dict[str, Va
     for i, name in enumerate(names):
         column = np.arange(2.0)[:, None] == i
         box[name] = marked(*ends[name]), marked(*(column.astype(float),) * 2)
-    surface, sides, slope = _crossing(body, box, machine.costs)
+    surface, sides, slope = _crossing(body, box, machine)
     faces = [on_sides(body, {**sides, surface: above}) for above in (False, True)]
     parts = [tuple(children(face)) if isinstance(face, Tuple) else (face,) for face in faces]
     _check_calm(parts, box, np.array([ends[name][1] - ends[name][0] for name in names]))
@@ -147,7 +147,7 @@ def _parameters(names: Iterable[str], env: dict[str, Value], k: int) -> tuple[En
     return fixed, moving
 
 
-def _crossing(body: Term, box: Env, costs: Costs | None) -> tuple[Term, dict[Term, bool], Interval]:
+def _crossing(body: Term, box: Env, machine: Evaluator) -> tuple[Term, dict[Term, bool], Interval]:
     """The one surface that may cross a box, the sides on which others lie all over, and its slopes."""
     surfaces = _surfaces(body)
     sides: dict[Term, bool] = {}
@@ -161,10 +161,10 @@ def _crossing(body: Term, box: Env, costs: Costs | None) -> tuple[Term, dict[Ter
             open_.append((surface, slope))
     if len(open_) != 1:
         raise NotAnalytic
-    if costs is not None:
-        for surface in surfaces:
-            seen = costs.surfaces.setdefault(surface, Surface())
-            seen.asked = seen.moves = seen.met = seen.met or surface is open_[0][0]
+    for surface in surfaces if machine.costs is not None else ():
+        seen = machine.costs.surfaces.setdefault(surface, Surface())  # type: ignore[union-attr]
+        seen.met = seen.met or surface is open_[0][0]
+        seen.asked = seen.moves = machine.directions > 0
     return open_[0][0], sides, open_[0][1]
 
 
@@ -302,7 +302,8 @@ def _summed(it: _Rectangle, machine: Evaluator) -> Sums | None:
     with nullcontext() if machine.costs is None else machine.costs.apart(1.0):
         machine.count(totals.crossing)
     if machine.costs is not None:
-        machine.costs.stretches(len(stretches), len(stretches))
+        cells = sum(1 + (s.below != s.above) for s in stretches)
+        machine.costs.stretches(cells, cells)
     v, e = totals.number[..., None], totals.error[..., None]
     gross = np.array([[totals.gross[:, 0].max()], [totals.gross[:, 1:].max(initial=0.0)]])
     return Sums(v[:, 0], e[:, 0], v[:, 1:], e[:, 1:], gross=gross)
