@@ -19,7 +19,7 @@ from msgspec.structs import replace
 from potto.diagnostics import PottoError, declare
 from potto.kernels.cells import Cell, Rows, Value, listed
 from potto.kernels.errors import wrong_call
-from potto.python.arrays import batch_shapes, over_batch
+from potto.python.arrays import answers_in, batch_shapes, holds_functions, over_batch
 from potto.runtime.answers.estimate import Estimate
 from potto.runtime.answers.named import alike
 from potto.runtime.answers.printing import format_digits
@@ -263,16 +263,10 @@ def _estimate(name: str, argument: Estimate, batch: Batch, to_function: ToFuncti
     plain = argument.value if argument.tangent is None else (argument.value, argument.tangent)
     if plain is None:
         raise no_kind(name, argument, "this answer is a function and not a number")
-    if _holds_functions(plain):
+    if holds_functions(plain):
         message = f"`{name}` holds functions, of which an answer has no more than their places"
         raise wrong_call(message, "give its parts: `(2.0, f)`, or a dictionary by the names of its fields")
-    if plain is argument.value and isinstance(plain, tuple | list):
-        plain = tuple(argument) if isinstance(plain, tuple) else list(argument)  # each with its own error
-    return value_of(name, plain, batch, to_function)
-
-
-def _holds_functions(value: Any) -> bool:
-    return value is None or (isinstance(value, tuple | list) and any(map(_holds_functions, value)))
+    return value_of(name, plain if (parts := answers_in(argument)) is None else parts, batch, to_function)
 
 
 def evenly(lo: float, hi: float, count: int) -> np.ndarray[Any, np.dtype[np.float64]]:

@@ -31,8 +31,9 @@ def with_arrays(name: str, argument: Any, type: Type, sizes: Sizes) -> Any:
         return _array(name, argument, found, sizes)
     if isinstance(found, TupleOf) and found.dual and not isinstance(argument, tuple):
         return with_arrays(name, argument, found.items[0], sizes)  # without tangents
-    if isinstance(argument, Estimate) and argument.tangent is None and isinstance(argument.value, tuple):
-        argument = tuple(argument)  # its parts, each with its own error
+    if isinstance(argument, Estimate) and isinstance(argument.value, tuple):
+        parts = answers_in(argument)
+        argument = argument if parts is None else parts
     if isinstance(found, TupleOf) and found.record is not None and not isinstance(argument, tuple):
         argument = _fields(name, argument, found.record)
     if isinstance(found, TupleOf) and isinstance(argument, tuple) and len(argument) == len(found.items):
@@ -163,8 +164,9 @@ def _columns(
 
 def _answer(name: str, answer: Estimate, type: ArrayOf, sizes: Sizes) -> Any:
     """An array that was an answer, with the errors that it has."""
-    if isinstance(answer.value, list):
-        return _array(name, list(answer), type, sizes)
+    parts = answers_in(answer)
+    if parts is not None:
+        return _array(name, parts, type, sizes)
     value = _array(name, answer.value, type, sizes)
     off = np.asarray(answer.error, dtype=float) if isinstance(answer.error, np.ndarray | list | float) else None
     if not isinstance(value, Rows) or off is None or not off.any():
@@ -172,6 +174,19 @@ def _answer(name: str, answer: Estimate, type: ArrayOf, sizes: Sizes) -> Any:
     error = _array(name, np.broadcast_to(off, np.shape(answer.value)), type, sizes)
     errors = iter(all_cells(error))
     return map_cells(value, lambda cell: Cell(cell.v, np.broadcast_to(next(errors).v, np.shape(cell.v))))
+
+
+def answers_in(answer: Estimate) -> tuple[Estimate, ...] | list[Estimate] | None:
+    """The parts of an answer that is a tuple or a list, each with its own error; None for any other one, for a dual,
+    and where there are functions in it."""
+    if answer.tangent is not None or not isinstance(answer.value, tuple | list) or holds_functions(answer.value):
+        return None
+    return tuple(answer) if isinstance(answer.value, tuple) else list(answer)
+
+
+def holds_functions(value: Any) -> bool:
+    """Whether there are functions in an answer, of which it has the places alone."""
+    return value is None or (isinstance(value, tuple | list) and any(map(holds_functions, value)))
 
 
 def _of_numbers(type: Type) -> bool:
