@@ -126,6 +126,15 @@ class Plan(Struct, frozen=True, dict=True):
         return self.outline.steps
 
     @cached_property
+    def line(self) -> Straight | None:
+        """The integral over the innermost variable alone, those further out being parameters, where its cuts are closed
+        forms."""
+        *_, last = self.levels
+        if self.inlined is None or last.peaks:
+            return None
+        return straight(integral((last.variable,), self.term.bounds[-1:], self.term.body), self.inlined, (last,))
+
+    @cached_property
     def box(self) -> Box | None:
         """How members of a batch are recognized that no surface cuts, where that can be told."""
         return None if self.inlined is None else box_of(self.term, self.surfaces, self.body, self.inlined)

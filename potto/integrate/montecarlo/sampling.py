@@ -20,6 +20,7 @@ from msgspec.structs import replace
 from potto.integrate.adaptive.iterated import Iteration
 from potto.integrate.degenerate.undefined import guarded_samples
 from potto.integrate.events import BUDGET_SPENT, NO_SAMPLE
+from potto.integrate.fixed.alike import by_shapes
 from potto.integrate.montecarlo.cube_map import Chart, Point
 from potto.integrate.montecarlo.rare_events import (
     MISSED,
@@ -33,7 +34,7 @@ from potto.integrate.montecarlo.rare_events import (
 )
 from potto.integrate.montecarlo.replicates import Moments, Replicates, added
 from potto.integrate.montecarlo.surface_terms import Surface, factors
-from potto.integrate.pieces import Sums, dense
+from potto.integrate.pieces import Sums, dense, gather, take
 from potto.integrate.plan import Plan
 from potto.integrate.rules.gauss import EPS
 from potto.integrate.rules.sobol import MOST, Sobol
@@ -315,9 +316,22 @@ class _Run(Struct, dict=True):
         """F times the volume element."""
         if not self.exact:
             return self.body(point, sides, n)
-        machine = self.iteration.machine
+        return self.weighted(self.lines(point, sides, n), point.volume, n)
+
+    def lines(self, point: Point, sides: dict[int, Mask], n: int) -> Sums:
+        """The integrals over the variable that is left to quadrature: those by one rule that are plain, as most are."""
+        plan, machine, env = self.plan, self.iteration.machine, point.env
+        found = None
+        if plan.line is not None and not (sides or self.iteration.still):
+            found = by_shapes(plan.line, plan.degrees[-1:], machine, env, n)
+        done = np.zeros(n, dtype=bool) if found is None else found[0]
+        rest = np.flatnonzero(~done)
+        if found is not None and not rest.size:
+            return found[1]
         sides = {**self.turning(point, n), **sides}
-        return self.weighted(self.iteration.run(self.drawn, point.env, n, sides, machine), point.volume, n)
+        here = env if found is None else gather(env, rest)
+        sums = self.iteration.run(self.drawn, here, rest.size, {g: take(m, rest) for g, m in sides.items()}, machine)
+        return sums if found is None else found[1].with_members(rest, sums)
 
     def turning(self, point: Point, n: int) -> dict[int, Mask]:
         """The sides, decided by what is drawn, that turn round those decided further in."""
