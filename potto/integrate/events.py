@@ -39,6 +39,10 @@ class Event(Struct, frozen=True):
         """The event of some of the members that met it."""
         return self
 
+    def joined(self, members: Members, other: Event, more: Members, both: Members) -> Event:
+        """The event as all of these met it, in this order: some members this one, others another one with its key."""
+        return self
+
 
 class TwoSided(Event, frozen=True):
     """Why derivatives on the two sides differ: a surface lies on a bound of a variable, or on another surface.
@@ -72,26 +76,46 @@ class Along(Event, frozen=True):
     bound: bool = False
 
 
-class Fold(Event, frozen=True):
-    """Sections of a surface appear or merge: at which variable, of which of its cuts, where, and for which members.
+class Spot(Struct, frozen=True):
+    """Where sections of a surface appear or merge: at which variable, of which of its cuts, where along it, and where
+    that is in the variables further out. Of an integral inside of another one that means nothing outside: the number is
+    INNER."""
 
-    outer: where that is in the variables further out. owner: None where for all. Of an integral inside of another one
-    only that there is one: its variables and its batch mean nothing outside, and the number is INNER.
-    """
+    number: int = INNER
+    cut: int = 0
+    place: float = 0.0
+    outer: tuple[float, ...] = ()
+
+
+class Fold(Event, frozen=True):
+    """Sections of a surface appear or merge. spots: where, for each of the members that met it; one for all where there
+    is but one, or where it is inside."""
 
     cause: TwoSided
-    number: int
-    cut: int
-    place: float
-    owner: tuple[int, ...] | None
-    outer: tuple[float, ...] = ()
+    spots: tuple[Spot, ...] = (Spot(),)
 
     @property
     def key(self) -> object:
         return Fold, self.cause
 
     def outside(self) -> Event:
-        return Fold(self.cause, INNER, 0, 0.0, None)
+        return Fold(self.cause)
+
+    def spot(self, number: int) -> Spot:
+        """Where the member is that has this place among those that met it."""
+        return self.spots[number if len(self.spots) > 1 else 0]
+
+    def at(self, kept: Bools) -> Event:
+        if len(self.spots) == 1:
+            return self
+        return Fold(self.cause, tuple(spot for spot, there in zip(self.spots, kept, strict=True) if there))
+
+    def joined(self, members: Members, other: Event, more: Members, both: Members) -> Event:
+        if both is None or members is None or more is None or not isinstance(other, Fold):
+            return self
+        known = {m: other.spot(i) for i, m in enumerate(more.tolist())}
+        known |= {m: self.spot(i) for i, m in enumerate(members.tolist())}
+        return Fold(self.cause, tuple(known[m] for m in both.tolist()))
 
 
 class Degenerate(Event, frozen=True):
@@ -281,9 +305,12 @@ class Events:
 
     def note(self, event: Event, members: Members = None) -> None:
         """Add an event, or the members that met it as well."""
-        first, known = self._met.get(event.key, (event, members))
+        if event.key not in self._met:
+            self._met[event.key] = event, None if members is None else np.unique(members)
+            return
+        first, known = self._met[event.key]
         both = None if members is None or known is None else np.union1d(known, members)
-        self._met[event.key] = first, both
+        self._met[event.key] = first.joined(known, event, members, both), both
 
     def take(self, other: Events, index: Members) -> None:
         """Add what a part of the batch has met, whose members are those of `index` here; None: nobody knows which."""

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 import potto
+from potto.integrate.adaptive.iterated import Iteration
 
 TRIANGLE = """
 def covered(x0, y0, ax, ay, bx, by, cx, cy)
@@ -201,3 +202,18 @@ def f(a, b, t)
     answer = potto.deriv(potto.compile(program).f)((a, 0.0), (0.5, 0.0), (0.5, 1.0))
     assert (np.abs(answer.tangent - 1 / 256) <= answer.tangent_error + 1e-17).all()
     assert (answer.tangent_error[:-1] <= 1e-14).all()
+
+
+def test_members_at_folds_are_looked_at_together(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of 16 pixels an ellipse touches the sides of eight exactly. All that is looked at beside these is one batch, and
+    each has the derivative that it has by itself: to the last bit, as nodes are the same."""
+    text = """
+def f(px, py, r) integral ([px, px + 1/4], [py, py + 1/4]) [(x - 1/2)^2 + 2*(y - 1/2)^2 < r] d(x, y)
+"""
+    x, y = (side.ravel() for side in np.meshgrid(np.arange(4) / 4, np.arange(4) / 4))
+    slope, calls, whole = potto.grad(potto.compile(text).f, "r"), [], Iteration.whole
+    monkeypatch.setattr(Iteration, "whole", lambda *args: calls.append(args[2]) or whole(*args))
+    found = slope(x, y, 0.125)
+    assert found.converged and not found.notes and len(calls) <= 4
+    assert found.tangent.sum() == pytest.approx(math.pi / math.sqrt(2), abs=1e-14)
+    assert found.tangent.tolist() == [slope(*map(float, at), 0.125).tangent for at in zip(x, y, strict=True)]

@@ -21,7 +21,7 @@ import numpy as np
 from potto.integrate.decomposition.cuts import NARROW, Cuts
 from potto.integrate.decomposition.meetings import Edge, Meeting, as_array
 from potto.integrate.degenerate.scene import Scene, all_subsets
-from potto.integrate.events import Fold, TwoSided, on_a_bound
+from potto.integrate.events import Fold, Spot, TwoSided, on_a_bound
 from potto.integrate.levels import LevelPlan
 from potto.integrate.pieces import Sums, components, still
 from potto.integrate.rules.gauss import EPS
@@ -113,13 +113,14 @@ def note_folds(scene: Scene, cuts: Cuts) -> None:
             counts[apart] = scene.counted(fold.owner[apart])
         if not counts.any():
             continue
-        owner, x = fold.owner[counts], float(fold.x[counts][0])
+        owner, x = fold.owner[counts], fold.x[counts]
         here = [scene.env.get(level.variable) for level in levels[:number]]
-        outer = [as_array(cell.v, cuts.sign.size)[owner[0]] for cell in here if isinstance(cell, Cell)]
+        outer = [as_array(cell.v, cuts.sign.size)[owner] for cell in here if isinstance(cell, Cell)]
         named = TwoSided(levels[number].variable, levels[number].level.cuts[fold.cut].surface, fold=True)
-        all_of_it = None if number else tuple(map(int, owner))
-        event = Fold(named, number, fold.cut, x, all_of_it, tuple(map(float, outer)))
-        scene.machine.note(event, scene.below(owner))
+        members = scene.below(owner)
+        first = np.array([0]) if members is None else np.unique(members, return_index=True)[1]
+        spots = (Spot(number, fold.cut, float(x[i]), tuple(float(at[i]) for at in outer)) for i in first)
+        scene.machine.note(Fold(named, tuple(spots)), members)
 
 
 def _apart(scene: Scene, owner: Ints) -> Ints:

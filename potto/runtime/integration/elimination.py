@@ -66,11 +66,8 @@ def _member(known: Eliminated, problem: Problem) -> Sums | None:
 def _outermost(fold: Fold, known: Eliminated) -> bool:
     """Whether a fold is one of a surface that cuts the outermost variable: the steps have cuts of their own."""
     level = known.plans[0].levels[0]
-    return (
-        fold.number == 0
-        and fold.cause.variable == level.variable
-        and any(fold.cut == number and cut.surface is fold.cause.surface for number, cut in enumerate(level.level.cuts))
-    )
+    own = {number for number, cut in enumerate(level.level.cuts) if cut.surface is fold.cause.surface}
+    return fold.cause.variable == level.variable and all(not spot.number and spot.cut in own for spot in fold.spots)
 
 
 class _NotEvaluated(Exception):

@@ -3,8 +3,8 @@
 Owns `by_members`, `one_by_one` and `Whole`. A batch is integrated at once. Members that meet something (a surface that
 runs along a variable, roots that merge, a bound that rounding hides, a budget that is spent) are taken out, since what
 helps them costs the others time and tells nothing of them: those that another order of the variables may help are done
-so together, those with two sides together, those that no order helps in each direction that moves them by itself, all
-others one by one.
+so together, those at folds together, those with two sides together, those that no order helps in each direction that
+moves them by itself, all others one by one.
 """
 
 from __future__ import annotations
@@ -161,11 +161,12 @@ def _together(problem: Problem, todo: Ints, settled: Settled, found: Whole) -> l
             return alone
         if kinds is None:
             return [*alone, todo]
-        turned, trouble, sided = kinds
-        for group in (np.nonzero(~(turned | trouble | sided))[0], np.nonzero(sided)[0]):
+        turned, trouble, *apart = kinds
+        plain = ~np.logical_or.reduce(kinds)
+        for group in (np.nonzero(kind)[0] for kind in (plain, *apart)):
             if group.size:
                 with here.among(group) as part:
-                    part.events.take(here.events.of(group, TwoSided), np.arange(group.size))
+                    part.events.take(here.events.of(group, TwoSided, Fold), np.arange(group.size))
                     own = settled(part, order, sums.pick(group))
                     rough = missing(problem.term, own, problem.machine.settings, part.env)
                     spoilt = rough & rounded(own)
@@ -201,11 +202,12 @@ def by_cuts(problem: Problem, order: Integral, sums: Sums, which: Bools) -> None
         getattr(sums, name)[..., index[better]] = getattr(found, name)[..., better]
 
 
-def _kinds(events: Events, size: int) -> tuple[Bools, Bools, Bools] | None:
-    """The members that want other variables innermost, those in trouble, and those with two sides; None if nobody
-    knows of something which of them met it."""
+def _kinds(events: Events, size: int) -> tuple[Bools, Bools, Bools, Bools] | None:
+    """The members that want other variables innermost, those in trouble, those at folds, and those with two sides; None
+    if nobody knows of something which of them met it."""
     if not events.known(Degenerate, Shortfall, Unsearched, Fold, TwoSided):
         return None
     turned = events.touched(size, Degenerate)
-    trouble = events.touched(size, Shortfall, Unsearched, Fold) & ~turned
-    return turned, trouble, events.touched(size, TwoSided) & ~turned & ~trouble
+    trouble = events.touched(size, Shortfall, Unsearched) & ~turned
+    folded = events.touched(size, Fold) & ~turned & ~trouble
+    return turned, trouble, folded, events.touched(size, TwoSided) & ~(turned | trouble | folded)

@@ -21,10 +21,10 @@ from potto.core.terms import Integral
 from potto.integrate.decomposition.cuts import frame_rows
 from potto.integrate.decomposition.meetings import Row
 from potto.integrate.decomposition.sections import searched_rows
-from potto.integrate.events import BOUNDLESS, INNER, Degenerate, Fold, OneSidedDerivatives, TwoSided
-from potto.integrate.pieces import Sums, still
+from potto.integrate.events import BOUNDLESS, INNER, Degenerate, Fold, OneSidedDerivatives, Shortfall, Spot, TwoSided
+from potto.integrate.pieces import Sums, gather, still
 from potto.integrate.plan import Plan
-from potto.kernels.cells import Array, Bools, Cell
+from potto.kernels.cells import Array, Bools, Cell, Ints
 from potto.runtime.evaluation.beside import (
     APART,
     NEARER,
@@ -36,7 +36,6 @@ from potto.runtime.evaluation.beside import (
     moving,
     parameter_step,
 )
-from potto.runtime.evaluation.machine import Machine
 from potto.runtime.integration.attempts import accurate
 from potto.runtime.integration.choices import orders
 from potto.runtime.integration.problem import Mixed, Problem
@@ -49,8 +48,9 @@ TOGETHER = 1e-9
 # The part of a derivative, or how many errors of the value, its error may be that no other order is tried.
 ROUGH, ROUNDED = 1e-9, 1e4
 GAP = 1e-8  # the part of a derivative from which on it is worth a look whether it has two sides that rounding hides
-MOST_MEMBERS = 16  # of a batch that are looked at
-# Member, direction, the derivatives before and behind the parameters, of all components, and how far off each may be.
+MOST_MEMBERS = 16  # of a batch that are looked at together
+# Which of the places looked at, direction, the derivatives before and behind the parameters, of all components,
+# and how far off each may be.
 Sides = tuple[int, int, Array, Array, tuple[Array, Array]]
 
 
@@ -110,17 +110,20 @@ def beside_folds(problem: Problem, plan: Plan, sums: Sums) -> None:
     What was noted of other surfaces lacks what folds.
     """
     machine, events = problem.machine, problem.events
-    found = [
-        (fold.cause, side)
-        for fold, _ in events.every(Fold)
-        for side in _sides(problem, plan, fold.owner or range(problem.batch), fold, sums)
+    met = [
+        (fold.cause, member, fold.spot(i))
+        for fold, who in events.every(Fold)
+        for i, member in enumerate(range(problem.batch) if who is None else who.tolist())
     ]
-    for cause, (member, d, backward, forward, off) in found:
+    places = [(member, spot) for _, member, spot in met]
+    for number, d, backward, forward, off in list(_sides(problem, plan, places, sums)):
+        cause, member, _ = met[number]
         t, et = sums.t[:, d, member], sums.et[:, d, member]
-        for edge, _ in events.every(OneSidedDerivatives):
+        for edge, who in events.every(OneSidedDerivatives):
+            own = np.arange(problem.batch) if who is None else who
             for side, one in zip(edge.sides, (backward, forward, *off), strict=True):
-                if np.shape(side) == sums.t.shape:
-                    side[:, d, member] = one
+                if np.shape(side) == (*sums.t.shape[:2], own.size):
+                    side[:, d, own == member] = one[:, None]
         if machine.side:
             t[:], et[:] = _of_side(machine.side, backward, forward, off)
             continue
@@ -132,9 +135,18 @@ def beside_folds(problem: Problem, plan: Plan, sums: Sums) -> None:
         known = np.isfinite(t) & np.isfinite(et)
         t[:] = np.where(known, t, np.where(np.isfinite(backward), backward, forward))
         et[:] = np.where(known, et, np.where(np.isfinite(t), np.where(np.isfinite(backward), *off), np.inf))
-        _endless(machine, backward, forward, t, et)
-        machine.note(OneSidedDerivatives(cause, backward, forward, *off))
+        _endless(problem, member, backward, forward, t, et)
+        _note(problem, member, OneSidedDerivatives(cause, backward, forward, *off))
     events.forget(Fold)
+
+
+def _note(problem: Problem, member: int, event: OneSidedDerivatives | Shortfall) -> None:
+    """Note what a member has met; its derivatives as those of a batch of one."""
+    if problem.batch == 1:
+        return problem.machine.note(event)
+    if isinstance(event, OneSidedDerivatives):
+        event = OneSidedDerivatives(event.cause, *(side[..., None] for side in event.sides))
+    return problem.machine.note(event, np.array([member]))
 
 
 def beside_axes(problem: Problem, plan: Plan, sums: Sums, variable: str) -> bool:
@@ -143,7 +155,7 @@ def beside_axes(problem: Problem, plan: Plan, sums: Sums, variable: str) -> bool
     if batch > MOST_MEMBERS or machine.overdrawn():
         return False
     problem.events.forget(Degenerate)
-    found = list(_sides(problem, plan, range(batch), None, sums))
+    found = list(_sides(problem, plan, [(member, None) for member in range(batch)], sums))
     resting = sum(not any(moving(v, d) for v in problem.env.values()) for d in range(machine.directions))
     if len(found) + batch * resting < batch * machine.directions:
         return False
@@ -157,8 +169,8 @@ def beside_axes(problem: Problem, plan: Plan, sums: Sums, variable: str) -> bool
             t[:], et[:] = 0.5 * (backward + forward), np.abs(forward - backward) + off[0] + off[1]
         else:
             et[:] = np.abs(t)
-            _endless(machine, backward, forward, t, et)
-            machine.note(OneSidedDerivatives(TwoSided(variable), backward, forward, *off))
+            _endless(problem, member, backward, forward, t, et)
+            _note(problem, member, OneSidedDerivatives(TwoSided(variable), backward, forward, *off))
     return True
 
 
@@ -168,12 +180,12 @@ def _of_side(side: int, backward: Array, forward: Array, off: tuple[Array, Array
     return t, np.where(np.isfinite(t), et, np.inf)
 
 
-def _endless(machine: Machine, backward: Array, forward: Array, t: Array, et: Array) -> None:
+def _endless(problem: Problem, member: int, backward: Array, forward: Array, t: Array, et: Array) -> None:
     """Put the infinity that is the derivative on both sides."""
     both = np.isinf(forward) & (forward == backward)
     t[:], et[:] = np.where(both, forward, t), np.where(both, np.inf, et)
     if both.any():
-        machine.note(BOUNDLESS)
+        _note(problem, member, BOUNDLESS)
 
 
 def _same(backward: Array, forward: Array, off: Array) -> bool:
@@ -183,36 +195,44 @@ def _same(backward: Array, forward: Array, off: Array) -> bool:
     return bool((near | (backward == forward)).all())
 
 
-def _sides(problem: Problem, plan: Plan, members: Sequence[int], where: Fold | None, sums: Sums) -> Iterator[Sides]:
-    """What is known of each member and direction in which anything moves."""
-    for member in members[:MOST_MEMBERS]:
-        one, here = problem.member(member), sums.pick(np.array([member]))
+def _sides(
+    problem: Problem, plan: Plan, places: Sequence[tuple[int, Spot | None]], sums: Sums
+) -> Iterator[Sides]:  # fmt: skip
+    """What is known of members, and where they are, in each direction in which anything moves; all that is looked at
+    along one direction is a batch."""
+    both = np.concatenate((-NEARER, NEARER))
+    for start in range(0, len(places), MOST_MEMBERS):
+        some = range(start, min(start + MOST_MEMBERS, len(places)))
+        alone = {places[i][0]: problem.member(places[i][0]) for i in some}
         for d in range(problem.machine.directions):
-            step = _step(one, plan, d, where)
-            if step is not None:
-                (backward, before), (forward, behind) = _led_to_both(one, d, step, here)
-                yield member, d, backward[:, 0], forward[:, 0], (before[:, 0], behind[:, 0])
+            steps = {i: step for i in some if (step := _step(alone[places[i][0]], plan, d, places[i][1])) is not None}
+            if not steps:
+                continue
+            members = np.repeat([places[i][0] for i in steps], both.size)
+            looks = iter(_at_each(problem, d, members, np.outer(list(steps.values()), both).ravel()))
+            for i, step in steps.items():
+                here = sums.pick(np.array([places[i][0]]))
+                backward, forward = (
+                    led_to([_parts(next(looks), here, d) for _ in NEARER], (here.v, here.e), sign * step * NEARER[-1])
+                    for sign in (-1.0, 1.0)
+                )
+                yield i, d, backward[0][:, 0], forward[0][:, 0], (backward[1][:, 0], forward[1][:, 0])
 
 
-def _led_to_both(problem: Problem, d: int, step: float, here: Sums) -> list[tuple[Array, Array]]:
-    """What `beside` finds of one integral on either side, with all places that are looked at as one batch."""
-    steps = [sign * step * NEARER for sign in (-1.0, 1.0)]
-    looks = _at_each(problem, d, np.concatenate(steps))
-    return [
-        led_to([_parts(look, here, d) for look in near], (here.v, here.e), own[-1])
-        for near, own in zip((looks[: NEARER.size], looks[NEARER.size :]), steps, strict=True)
-    ]
-
-
-def _at_each(problem: Problem, d: int, steps: Array) -> list[Sums | None]:
-    """One integral after each of these steps: together, and those of which nothing is known so by themselves."""
+def _at_each(problem: Problem, d: int, members: Ints, steps: Array) -> list[Sums | None]:
+    """These members after these steps: together, and those of which nothing is known so by themselves."""
     found: list[Sums | None] = [None] * steps.size
     if not problem.machine.overdrawn():
         with suppress(Mixed):
-            whole = problem.beside({n: moved(v, steps, d) for n, v in problem.env.items()}, steps.size)
+            here = gather(problem.env, members) if problem.batch > 1 else problem.env
+            whole = problem.beside({n: moved(v, steps, d) for n, v in here.items()}, steps.size)
             known: Bools = np.logical_and.reduce(np.isfinite(np.concatenate((whole.e, *whole.et))))
             found = [whole.pick(np.array([i])) if known[i] else None for i in range(steps.size)]
-    return [_after(problem, d, float(h)) if look is None else look for look, h in zip(found, steps, strict=True)]
+    left = (
+        _after(problem.member(int(member)), d, float(h)) if look is None else look
+        for look, member, h in zip(found, members, steps, strict=True)
+    )
+    return list(left)
 
 
 def _after(problem: Problem, d: int, step: float) -> Sums | None:
@@ -243,7 +263,7 @@ def _parts(found: Sums | None, here: Sums, d: int) -> Parts:
     return found.v, found.e, found.t[:, d], found.et[:, d]
 
 
-def _step(problem: Problem, plan: Plan, d: int, where: Fold | None) -> float | None:
+def _step(problem: Problem, plan: Plan, d: int, where: Spot | None) -> float | None:
     """The largest step that moves the roots that fold, or all roots, by a small part of the range, either way.
 
     Where nobody knows the roots, since an integral further in has them or they have no closed form, a small part of the
@@ -272,7 +292,7 @@ def _step(problem: Problem, plan: Plan, d: int, where: Fold | None) -> float | N
     return float(STEPS[np.nonzero(fits)[0][-1]]) if fits.any() else None
 
 
-def _off(rows: Sequence[Row], low: Array, high: Array, where: Fold | None) -> Array:
+def _off(rows: Sequence[Row], low: Array, high: Array, where: Spot | None) -> Array:
     """How far each step moves those roots of a variable that fold, or all in its range."""
     off = np.zeros(low.size)
     for row in rows:
@@ -285,12 +305,12 @@ def _off(rows: Sequence[Row], low: Array, high: Array, where: Fold | None) -> Ar
     return off
 
 
-def _searched(plan: Plan, where: Fold) -> bool:
+def _searched(plan: Plan, where: Spot) -> bool:
     level = plan.levels[where.number]
     return level.level.cuts[where.cut] in level.searched
 
 
-def _room(low: Array, high: Array, rows: Sequence[Row], where: Fold | None) -> Array:
+def _room(low: Array, high: Array, rows: Sequence[Row], where: Spot | None) -> Array:
     """How far it is from one end of the range to the other, or from what folds to what else lies in it."""
     reach = np.abs(high - low)
     place = 0.0 if where is None else where.place

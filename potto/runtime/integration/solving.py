@@ -239,5 +239,5 @@ def improved(problem: Problem, order: Integral, sums: Sums, improvers: Sequence[
 
 
 ALONE = (by_less, beside_another, on_both_sides, at_folds, in_another_order, by_differences)
-TOGETHER = (beside_another, on_both_sides, in_another_order)
+TOGETHER = (beside_another, on_both_sides, at_folds, in_another_order)
 INSIDE = (beside_another,)
