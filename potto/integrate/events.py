@@ -35,8 +35,8 @@ class Event(Struct, frozen=True):
         """The event as an integral further out meets it."""
         return self
 
-    def at(self, kept: Bools) -> Event:
-        """The event of some of the members that met it."""
+    def at(self, places: Ints) -> Event:
+        """The event of some of the members that met it, by their places among these."""
         return self
 
     def joined(self, members: Members, other: Event, more: Members, both: Members) -> Event:
@@ -105,10 +105,8 @@ class Fold(Event, frozen=True):
         """Where the member is that has this place among those that met it."""
         return self.spots[number if len(self.spots) > 1 else 0]
 
-    def at(self, kept: Bools) -> Event:
-        if len(self.spots) == 1:
-            return self
-        return Fold(self.cause, tuple(spot for spot, there in zip(self.spots, kept, strict=True) if there))
+    def at(self, places: Ints) -> Event:
+        return self if len(self.spots) == 1 else Fold(self.cause, tuple(self.spots[i] for i in places.tolist()))
 
     def joined(self, members: Members, other: Event, more: Members, both: Members) -> Event:
         if both is None or members is None or more is None or not isinstance(other, Fold):
@@ -147,8 +145,8 @@ class OneSidedDerivatives(Event, frozen=True):
     def sides(self) -> tuple[Array, Array, Array, Array]:
         return self.backward, self.forward, self.backward_error, self.forward_error
 
-    def at(self, kept: Bools) -> Event:
-        return OneSidedDerivatives(self.cause, *(side[..., kept] for side in self.sides))
+    def at(self, places: Ints) -> Event:
+        return OneSidedDerivatives(self.cause, *(side[..., places] for side in self.sides))
 
 
 LESS = "ask for less accuracy (`--rtol`)"
@@ -305,8 +303,11 @@ class Events:
 
     def note(self, event: Event, members: Members = None) -> None:
         """Add an event, or the members that met it as well."""
+        if members is not None:
+            members, places = np.unique(members, return_index=True)
+            event = event.at(places)
         if event.key not in self._met:
-            self._met[event.key] = event, None if members is None else np.unique(members)
+            self._met[event.key] = event, members
             return
         first, known = self._met[event.key]
         both = None if members is None or known is None else np.union1d(known, members)
@@ -353,6 +354,6 @@ class Events:
                 continue
             if members is None:
                 found.note(event)
-            elif (kept := np.isin(members, index)).any():
+            elif (kept := np.flatnonzero(np.isin(members, index))).size:
                 found.note(event.at(kept), np.searchsorted(index, members[kept]))
         return found

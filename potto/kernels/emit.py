@@ -19,7 +19,7 @@ from potto.calculus.differentiation.derivative import partial
 from potto.core.terms import Branch, Const, If, Prim, Term, Var, postorder, var
 from potto.kernels.slopes import EXACT, Loss, losses
 from potto.kernels.whole import ROUNDING, UNIT_ROUNDOFF
-from potto.primitives import PRIMITIVES
+from potto.primitives import EXPONENT, PRIMITIVES
 from potto.primitives.walking import formula_of
 
 ZERO = "0.0"
@@ -313,7 +313,7 @@ class Lines:
     def off(self, op: str, args: Sequence[Scalar], i: int, *factors: str) -> str:
         """What a builtin is off as its i-th argument is."""
         size = f"abs({self.product(*factors)})"
-        return size if (op, i) != ("pow", 1) else f"{self.ufunc('support.by_exponent')}({args[0].v}, {size})"
+        return size if (op, i) != EXPONENT else f"{self.ufunc('support.by_exponent')}({args[0].v}, {size})"
 
     def tangent_rounded(
         self, t: str, exact: list[tuple[str, str]] | None, parts: Mapping[int, str], lost: Losses

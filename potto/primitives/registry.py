@@ -159,6 +159,7 @@ class Primitive(Struct, frozen=True):
 
 
 PRIMITIVES: dict[str, Primitive] = {}
+EXPONENT = "pow", 1  # a builtin and its argument by which there may be no derivative where there is one by the other
 UNDOES: dict[str, str] = {}
 """f and g with f(g(x)) = x wherever g(x) is defined: read off the inverses."""
 EXACT: dict[tuple[str, float], float] = {}

@@ -16,6 +16,7 @@ import pytest
 
 import potto
 from potto.integrate.adaptive.iterated import Iteration
+from potto.integrate.events import Events, Fold, Spot, TwoSided
 
 TRIANGLE = """
 def covered(x0, y0, ax, ay, bx, by, cx, cy)
@@ -217,3 +218,15 @@ def f(px, py, r) integral ([px, px + 1/4], [py, py + 1/4]) [(x - 1/2)^2 + 2*(y -
     assert found.converged and not found.notes and len(calls) <= 4
     assert found.tangent.sum() == pytest.approx(math.pi / math.sqrt(2), abs=1e-14)
     assert found.tangent.tolist() == [slope(*map(float, at), 0.125).tangent for at in zip(x, y, strict=True)]
+
+
+def test_places_of_folds_go_with_their_members() -> None:
+    """Also of members that are named out of order, or twice; the first to name one says where it is."""
+    cause, met = TwoSided("x", fold=True), Events()
+    met.note(Fold(cause, tuple(Spot(0, 0, place) for place in (5.0, 2.0, 5.5))), np.array([5, 2, 5]))
+    met.note(Fold(cause, (Spot(0, 0, 2.5), Spot(0, 0, 9.0), Spot(0, 0, 1.0))), np.array([2, 9, 1]))
+    ((event, members),) = met.every(Fold)
+    assert members is not None and members.tolist() == [1, 2, 5, 9]
+    assert [event.spot(i).place for i in range(4)] == [1.0, 2.0, 5.0, 9.0]
+    ((some, kept),) = met.of(np.array([2, 3, 9])).every(Fold)
+    assert kept is not None and kept.tolist() == [0, 2] and [spot.place for spot in some.spots] == [2.0, 9.0]

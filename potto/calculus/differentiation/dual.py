@@ -68,7 +68,7 @@ from potto.core.terms import (
     var,
     with_integrand,
 )
-from potto.primitives import PRIMITIVES
+from potto.primitives import EXPONENT, PRIMITIVES
 
 Dual = tuple[Term, Term]
 NO_TANGENTS: Mapping[str, Term] = {}
@@ -211,14 +211,16 @@ class _Pass:
         names = {i: fresh(f"z{i}", value.free) for i in moving}
         opened = rebuild(node, tuple(var(names[i]) if i in names else v for i, v in enumerate(values)))
         back = {names[i]: values[i] for i in moving}
-        parts = ((scaled(substitute(partial(opened, names[i]), back), slopes[i]), slopes[i]) for i in moving)
-        broken = entry.broken and not self.owner.folding
-        return value, add(*(self.where_it_moves(part, slope) if broken else part for part, slope in parts))
+        parts = {i: scaled(substitute(partial(opened, names[i]), back), slopes[i]) for i in moving}
+        if (node.op, 1) == EXPONENT and 1 in parts:
+            parts[1] = self.where_it_moves(parts[1], slopes[1])
+        return value, add(*parts.values())
 
     def where_it_moves(self, part: Term, slope: Term) -> Term:
-        """What a parameter adds that an argument is: nothing where it stands still, also where no derivative by it is a
-        number, as that of x^n by n at x < 0. In formulas everything that is named moves."""
-        return if_(prim("eq", slope, ZERO), ZERO, part) if isinstance(slope, Var | Proj) else part
+        """What a parameter adds that is an exponent: nothing where it stands still, also where no derivative by it is a
+        number, as that of x^n at x < 0. In formulas everything that is named moves."""
+        named = isinstance(slope, Var | Proj) and not self.owner.folding
+        return if_(prim("eq", slope, ZERO), ZERO, part) if named else part
 
     def branch(self, node: Branch) -> Dual:
         duals = [self.found[p] for p in children(node)]

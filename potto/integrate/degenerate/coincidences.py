@@ -118,7 +118,9 @@ def note_folds(scene: Scene, cuts: Cuts) -> None:
         outer = [as_array(cell.v, cuts.sign.size)[owner] for cell in here if isinstance(cell, Cell)]
         named = TwoSided(levels[number].variable, levels[number].level.cuts[fold.cut].surface, fold=True)
         members = scene.below(owner)
-        first = np.array([0]) if members is None else np.unique(members, return_index=True)[1]
+        first = np.array([0])
+        if members is not None:
+            members, first = np.unique(members, return_index=True)
         spots = (Spot(number, fold.cut, float(x[i]), tuple(float(at[i]) for at in outer)) for i in first)
         scene.machine.note(Fold(named, tuple(spots)), members)
 
