@@ -6,12 +6,13 @@ STAMP := $(VENV)/.stamp
 VSCODE := editors/vscode
 EXTRAS ?= dev
 
-PACKAGES := -c 'import sysconfig; print(sysconfig.get_path("purelib"))'
+# What .venv-native has from .venv.
+SHARED := 'import sysconfig; p = sysconfig.get_path("purelib"); open(p + "/shared.pth", "w").write(p.replace(".venv-native", "$(VENV)"))'
 
 TORCH ?= torch==2.13.0
 TESTS := $(BIN)/python -m pytest -n auto --maxprocesses 8 --dist worksteal --durations 20
 
-.PHONY: tables docs wheels demo gallery test quick fuzz lint check format clean native pictures test-bridges hours vsix e2e
+.PHONY: tables docs wheels demo gallery test quick fuzz lint check format clean native machine-code pictures test-bridges hours vsix e2e
 
 demo: $(STAMP)  ## the paper's programs, evaluated and differentiated
 	@PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/python examples/demo.py
@@ -49,10 +50,12 @@ check: lint  ## lints, types, floors
 tables: $(STAMP)  ## potto/syntax/tables.json: what the parser reads, of the grammar as it is now
 	$(BIN)/python -c 'from potto.syntax.tables import write; write()'
 
-native: $(STAMP)  ## .venv-native: the front end as machine code (needs a C compiler), beside all that .venv has
-	test -x .venv-native/bin/python || $(PYTHON) -m venv --without-pip .venv-native
-	$(BIN)/python $(PACKAGES) >"$$(.venv-native/bin/python $(PACKAGES))/others.pth"
-	HATCH_BUILD_HOOKS_ENABLE=1 $(BIN)/python -m pip --python .venv-native install -qq --disable-pip-version-check --no-deps --force-reinstall .
+native: $(STAMP) machine-code  ## .venv-native: the front end as machine code (needs a C compiler), with all else of .venv
+
+machine-code:
+	test -x .venv-native/bin/python || $(PYTHON) -m venv .venv-native
+	.venv-native/bin/python -c $(SHARED)
+	HATCH_BUILD_HOOKS_ENABLE=1 .venv-native/bin/python -m pip install -qq --disable-pip-version-check --no-deps --force-reinstall .
 
 docs: $(STAMP)  ## the pages as a site in build/site: links and anchors checked, their programs run
 	$(BIN)/python -c 'import material' 2>/dev/null || $(BIN)/python -m pip install -qq --disable-pip-version-check -e '.[docs]'

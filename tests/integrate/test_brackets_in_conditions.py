@@ -427,11 +427,11 @@ def test_samples_see_the_boundary(method: str) -> None:
 
 
 def test_too_many_cases_are_told() -> None:
-    """A step that is not affine, 12 times: no proof says which sides are empty."""
+    """A step that is not affine, 9 times: no proof says which sides are empty."""
     text = """
 def step(s, t) if [s < t] then s + 0.2*cos(s) else s*s
 def sim(n, s, t) if n > 0 then sim(n - 1, step(s, t), t) else s
-def f(t) integral [0, 1] sim(12, x, t) d(x)
+def f(t) integral [0, 1] sim(9, x, t) d(x)
 """
     with potto.settings(max_evals=20_000):
         answer = potto.compile(text).f(0.5)
