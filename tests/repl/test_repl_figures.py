@@ -64,7 +64,7 @@ def test_an_image_as_svg_has_axes_and_a_scale(talk) -> None:
 
 def test_sampled_values_have_their_bands_in_both(talk) -> None:
     """At t = 0 the error is 0, so that a lower end of the band would lie on the frame."""
-    talk.all(":set method mc", ":set samples 500", "def h(t) integral ([0, 1], [0, 1]) [x + y^2 < t] d(x, y)",
+    talk.all(":set method mc", ":set samples 500", "def h(t) integral [0, 1] [x^2 < t]*x d(x)",
              ":plot h, h(t)/2 0 0.9", ":save p.svg")  # fmt: skip
     svg = (talk.folder / "p.svg").read_text()
     assert svg.count("<polygon") >= 2
