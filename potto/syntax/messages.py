@@ -157,15 +157,7 @@ def _special(stop: Stop) -> Diagnostic | None:
     opened, at, before = stop.opened, stop.at, stop.before
     if at.kind == "COMMA" and opened is not None and opened.kind == "LET":
         return kinds.UNEXPECTED(at.span, "unexpected `,`", help="separate the names of a `let` by `;`, or by lines")
-    is_field = at.text.isidentifier() and stop.after is not None and stop.after.kind == "COLON"
-    if is_field and stop.tokens[0].kind == "RECORDDEF":
-        if stop.before is not None and stop.before.kind not in ("LPAR", "COMMA"):
-            return kinds.RECORD_FORM(
-                at.span, f"expected `,` before `{at.text}`", help="fields are separated by `,`",
-                suggestions=write(stop.text, Span(stop.before.end, stop.before.end), ","),
-            )  # fmt: skip
-        return reserved_word(at.text, at.span)
-    found = _of_arrays(stop) or _behind_with(stop)
+    found = _in_record(stop) or _of_arrays(stop) or _behind_with(stop)
     if found is not None:
         return found
     unpacked = tuple_without_parentheses(stop)
@@ -187,10 +179,9 @@ def _special(stop: Stop) -> Diagnostic | None:
         )  # fmt: skip
     if at.kind in ("DOT", "DOTDOT") and before is not None and before.kind in ("FROM", "IMPORT"):
         return kinds.BAD_IMPORT(
-            at.span,
-            "a module's name does not begin with a dot",
+            at.span, "a module's name does not begin with a dot",
             help="write `from m import a`: it is looked for beside this file, then from the roots",
-        )
+        )  # fmt: skip
     if at.kind == "STAR" and opened is not None and opened.kind == "IMPORT":
         return kinds.BAD_IMPORT(at.span, "an import says which names it takes", help="list the names instead of `*`")
     if at.kind == "COMMA" and stop.values and isinstance(stop.values[0], Token) and stop.values[0].kind == "IMPORT":
@@ -200,11 +191,23 @@ def _special(stop: Stop) -> Diagnostic | None:
     loop = stop.last("FOR")
     if loop is not None and "INDENT" in stop.possible and not at.text:
         return kinds.UNFINISHED(
-            loop.span,
-            "this `for` has no statements",
+            loop.span, "this `for` has no statements",
             help="write them on the lines below, indented; or on the same line after a `:`",
-        )
+        )  # fmt: skip
     return None
+
+
+def _in_record(stop: Stop) -> Diagnostic | None:
+    """Fields without a comma between them, or whose name is taken."""
+    at, before, after = stop.at, stop.before, stop.after
+    if stop.tokens[0].kind != "RECORDDEF" or not at.text.isidentifier() or after is None or after.kind != "COLON":
+        return None
+    if before is None or before.kind in ("LPAR", "COMMA"):
+        return reserved_word(at.text, at.span)
+    return kinds.RECORD_FORM(
+        at.span, f"expected `,` before `{at.text}`", help="fields are separated by `,`",
+        suggestions=write(stop.text, Span(before.end, before.end), ","),
+    )  # fmt: skip
 
 
 def _of_arrays(stop: Stop) -> Diagnostic | None:

@@ -226,10 +226,7 @@ def _integral(
     indices = [name for name, _, _ in around]
     names, ranges = (*node.variables, *indices), _ranges(around)
     box = {**ranges, **box_of(node)}
-    deltas: list[str] = []
-    meeting: list[str] = []
-    boundary: list[str] = []
-    bounds: list[str] = []
+    deltas, meeting, boundary, bounds = list[str](), list[str](), list[str](), list[str]()
     interior, reason = "", ""
     try:
         interior = words.text(rate(node.body), *names, box=box)
