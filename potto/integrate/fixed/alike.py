@@ -91,8 +91,8 @@ def _of_one_form(
     most = CANCELS * added if batch > 1 else 0.0  # for one there are other ways
     left = np.maximum(most, min(machine.rtol, ROUNDED) * np.minimum(added, 1.0)) if batch > 1 else 0.0
     error = truncated + rounding
-    fine = error <= np.maximum(asked, left)
-    fine[1:] |= added_up(env, number[1:], error[1:], machine.rtol)
+    fine = rounding <= np.maximum(asked - truncated, left)
+    fine[1:] |= added_up(env, number[1:], rounding[1:], 0.5 * machine.rtol)
     fine &= truncated <= np.maximum(0.5 * asked, most)
     done &= fine.all(axis=0)
     if not done.any():
