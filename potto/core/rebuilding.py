@@ -7,51 +7,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from potto.core.kinds import (
-    App,
-    Array,
-    Branch,
-    Const,
-    Data,
-    Delta,
-    Deriv,
-    Fold,
-    Global,
-    Hole,
-    If,
-    Index,
-    Integral,
-    Lam,
-    Length,
-    ListOf,
-    Prim,
-    Proj,
-    Sum,
-    Term,
-    Tuple,
-    Var,
-    app,
-    array,
-    branch,
-    const,
-    data,
-    delta,
-    deriv,
-    fold,
-    global_,
-    hole,
-    if_,
-    index,
-    integral,
-    lam,
-    length,
-    list_of,
-    prim,
-    proj,
-    sum_,
-    tuple_,
-    var,
-)
+from potto.core import kinds
 
 
 def rebuilt(cls: type, fields: tuple[Any, ...]) -> Any:
@@ -59,30 +15,30 @@ def rebuilt(cls: type, fields: tuple[Any, ...]) -> Any:
     return _MADE_BY[cls](*fields)
 
 
-def _prim_from(op: str, args: tuple[Term, ...]) -> Prim:
-    return prim(op, *args)
+def _prim_from(op: str, args: tuple[kinds.Term, ...]) -> kinds.Prim:
+    return kinds.prim(op, *args)
 
 
 _MADE_BY: dict[type, Any] = {
-    Const: const,
-    Var: var,
-    Prim: _prim_from,
-    If: if_,
-    Branch: branch,
-    Tuple: tuple_,
-    Proj: proj,
-    ListOf: list_of,
-    Array: array,
-    Index: index,
-    Length: length,
-    Data: data,
-    Lam: lam,
-    App: app,
-    Global: global_,
-    Integral: integral,
-    Delta: delta,
-    Sum: sum_,
-    Fold: fold,
-    Deriv: deriv,
-    Hole: hole,
+    kinds.Const: kinds.const,
+    kinds.Var: kinds.var,
+    kinds.Prim: _prim_from,
+    kinds.If: kinds.if_,
+    kinds.Branch: kinds.branch,
+    kinds.Tuple: kinds.tuple_,
+    kinds.Proj: kinds.proj,
+    kinds.ListOf: kinds.list_of,
+    kinds.Array: kinds.array,
+    kinds.Index: kinds.index,
+    kinds.Length: kinds.length,
+    kinds.Data: kinds.data,
+    kinds.Lam: kinds.lam,
+    kinds.App: kinds.app,
+    kinds.Global: kinds.global_,
+    kinds.Integral: kinds.integral,
+    kinds.Delta: kinds.delta,
+    kinds.Sum: kinds.sum_,
+    kinds.Fold: kinds.fold,
+    kinds.Deriv: kinds.deriv,
+    kinds.Hole: kinds.hole,
 }
