@@ -19,7 +19,7 @@ from msgspec.structs import replace
 from potto.diagnostics import PottoError, declare
 from potto.kernels.cells import Cell, Rows, Value, listed
 from potto.kernels.errors import wrong_call
-from potto.python.arrays import answers_in, batch_shapes, holds_functions, over_batch
+from potto.python.arrays import answers_in, batch_shapes, halves, holds_functions, over_batch
 from potto.runtime.answers.estimate import Estimate
 from potto.runtime.answers.named import alike
 from potto.runtime.answers.printing import format_digits
@@ -144,15 +144,19 @@ def cut(given: Any, members: slice) -> Any:
 
 
 def _mapped(given: Any, change: Callable[[Any], Any], rows: Callable[[Any, tuple[int, ...]], Any]) -> Any:
-    """What calls were given with `change` done to every array. An answer over a batch becomes its numbers."""
+    """What calls were given with `change` done to every array, also to the errors of answers."""
     if isinstance(given, np.ndarray):
         return change(given) if given.ndim else given
     if isinstance(given, tuple | list):
         return type(given)(_mapped(item, change, rows) for item in given)
     if isinstance(given, dict):
         return {name: _mapped(item, change, rows) for name, item in given.items()}
-    if isinstance(given, Estimate) and given.value.__class__ is not float and given.value is not None:
-        return _mapped(given.value if given.tangent is None else (given.value, given.tangent), change, rows)
+    if isinstance(given, Estimate) and given.tangent is None and isinstance(given.value, np.ndarray):
+        error = np.broadcast_to(given.error, given.value.shape)
+        return Estimate(_mapped(given.value, change, rows), _mapped(error, change, rows))
+    if isinstance(given, Estimate):
+        parts = answers_in(given) if given.tangent is None else halves(given)
+        return given if parts is None else _mapped(parts, change, rows)
     if isinstance(given, Rows):
         return over_batch(given, rows)
     return given
@@ -256,11 +260,13 @@ def _array(name: str, argument: np.ndarray[Any, Any], batch: Batch) -> Value:
 
 def _estimate(name: str, argument: Estimate, batch: Batch, to_function: ToFunction) -> Value:
     """An answer as an argument, with the error that it has."""
-    if isinstance(argument.value, float) and argument.tangent is None:
+    if argument.tangent is not None:
+        return value_of(name, halves(argument), batch, to_function)
+    if isinstance(argument.value, float):
         return Cell(argument.value, argument.error or None)
-    if isinstance(argument.value, np.ndarray) and argument.tangent is None and np.any(argument.error):
+    if isinstance(argument.value, np.ndarray) and np.any(argument.error):
         return Cell(batch.flat(argument.value), batch.flat(np.broadcast_to(argument.error, argument.value.shape)))
-    plain = argument.value if argument.tangent is None else (argument.value, argument.tangent)
+    plain = argument.value
     if plain is None:
         raise no_kind(name, argument, "this answer is a function and not a number")
     if holds_functions(plain):

@@ -184,6 +184,11 @@ def answers_in(answer: Estimate) -> tuple[Estimate, ...] | list[Estimate] | None
     return tuple(answer) if isinstance(answer.value, tuple) else list(answer)
 
 
+def halves(dual: Estimate) -> tuple[Estimate, Estimate]:
+    """The value and the tangent of an answer that is a dual, each with its own error."""
+    return Estimate(dual.value, dual.error), Estimate(dual.tangent, dual.tangent_error)
+
+
 def holds_functions(value: Any) -> bool:
     """Whether there are functions in an answer, of which it has the places alone."""
     return value is None or (isinstance(value, tuple | list) and any(map(holds_functions, value)))
