@@ -68,7 +68,7 @@ class Fixture:
 
     def hover(self, needle: str | None = None, by: int = 0) -> str:
         """The hover at the cursor or at a text."""
-        found = ide.hover(self.db, self.file, self.offset if needle is None else self.find(needle, by))
+        found = ide.hover_at(self.db, self.file, self.offset if needle is None else self.find(needle, by))
         return "" if found is None else found.markdown
 
     def labels(self) -> list[str]:

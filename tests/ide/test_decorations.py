@@ -174,14 +174,14 @@ def test_formatting_while_typing(text, typed, after):
 def test_symbols_of_an_empty_file():
     f = fixture("\n")
     assert ide.document_symbols(f.db, f.file) == () and ide.semantic_tokens(f.db, f.file) == ()
-    assert ide.hover(f.db, f.file, 0) is None and ide.code_lenses(f.db, f.file) == ()
+    assert ide.hover_at(f.db, f.file, 0) is None and ide.code_lenses(f.db, f.file) == ()
     assert "def" in [i.label for i in ide.completions(f.db, f.file, 0).items]
 
 
 def test_a_file_that_is_not_there():
     f = fixture("y = 1\n")
     nowhere = f.key("nothing.po")
-    assert ide.hover(f.db, nowhere, 3) is None and ide.document_symbols(f.db, nowhere) == ()
+    assert ide.hover_at(f.db, nowhere, 3) is None and ide.document_symbols(f.db, nowhere) == ()
     assert ide.format_document(f.db, nowhere) == () and ide.code_actions(f.db, nowhere, Span(0, 0)) == ()
 
 

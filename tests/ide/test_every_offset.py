@@ -36,7 +36,7 @@ def ask_everything(library: Library, file: str, text: str, offsets) -> None:
         assert 0 <= span.start <= span.end <= len(text), span
 
     for offset in offsets:
-        hover = ide.hover(db, file, offset)
+        hover = ide.hover_at(db, file, offset)
         if hover is not None:
             inside(hover.span)
             assert hover.span.start <= offset <= hover.span.end

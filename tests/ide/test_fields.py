@@ -134,7 +134,7 @@ def test_columns_of_a_table(tmp_path: Path) -> None:
     text = 'people = load("people.csv")\ndef f(t) t*people.height[0]\nk = people.height[1]\n'
     key = library.put(library.key(tmp_path / "main.po"), text)
     at = text.index("height")
-    hover = ide.hover(library.db, key, at)
+    hover = ide.hover_at(library.db, key, at)
     assert hover is not None and hover.markdown.startswith("```potto\nheight : [2] Real\n```\n\ncolumn of `people.csv`")
     assert "[2] from 1.6 to 1.8, mean 1.7" in hover.markdown
     assert [p.span.start for p in ide.references(library.db, key, at)] == [at, text.rindex("height")]

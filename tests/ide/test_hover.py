@@ -194,7 +194,7 @@ def test_a_comment_has_no_hover_but_a_live_expression_has():
 
 def test_hover_is_one_word():
     f = fixture("def f(x) x + 1\n")
-    found = ide.hover(f.db, f.file, f.find("x +"))
+    found = ide.hover_at(f.db, f.file, f.find("x +"))
     assert found is not None and f.at(found.span) == "x"
 
 
@@ -316,18 +316,18 @@ def test_why_a_parameter_must_not_vary():
 
 def test_what_a_file_of_data_holds(tmp_path):
     from potto.checking.library import Library
-    from potto.ide.hover.hovers import hover
+    from potto.ide.hover.hovers import hover_at
 
     (tmp_path / "people.csv").write_text("height,weight\n1.5,60\n1.75,80\n")
     (tmp_path / "main.po").write_text('people = load("people.csv")\nmean = sum h in people.height (h)/2\n')
     library = Library([tmp_path])
     key = library.key(tmp_path / "main.po")
-    said = hover(library.db, key, 2)
+    said = hover_at(library.db, key, 2)
     assert said is not None
     assert "height [2] from 1.5 to 1.75" in said.markdown
     (tmp_path / "people.csv").write_text("height,weight\n1.5,60\n1.75,80\n2,90\n")
     assert library.refresh()
-    said = hover(library.db, key, 2)
+    said = hover_at(library.db, key, 2)
     assert said is not None
     assert "height [3] from 1.5 to 2" in said.markdown
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from ide_fixture import fixture
 
-from potto.ide.hover.derivatives import sound
+from potto.ide.hover.derivatives import is_sound
 
 
 @pytest.mark.parametrize(
@@ -33,22 +33,22 @@ def test_what_needs_something_wrong_is_wrong(program: str, expected: dict[str, b
     f = fixture(program)
     for order in (expected, dict(reversed(expected.items()))):
         fresh = fixture(program)
-        assert {name: sound(fresh.db, fresh.file, name) for name in order} == order
+        assert {name: is_sound(fresh.db, fresh.file, name) for name in order} == order
     text = f.text()
     f.library.files.set_text(f.file, text.replace("nowhere", "t"))
     fresh = fixture(text.replace("nowhere", "t"))
     for name in expected:
-        assert sound(f.db, f.file, name) == sound(fresh.db, fresh.file, name)
+        assert is_sound(f.db, f.file, name) == is_sound(fresh.db, fresh.file, name)
 
 
 def test_through_modules() -> None:
     low = "# file: a.po\ndef f(t) nowhere\ndef g(t) t\n"
     f = fixture(low + "# file: b.po\nfrom a import f, g\ndef h(t) f(t)\ndef k(t) g(t)\n")
-    assert (sound(f.db, f.file, "h"), sound(f.db, f.file, "k")) == (False, True)
+    assert (is_sound(f.db, f.file, "h"), is_sound(f.db, f.file, "k")) == (False, True)
 
 
 def test_a_long_chain() -> None:
     chain = "def f0(t) t\n" + "".join(f"def f{i}(t) f{i - 1}(t) + 1\n" for i in range(1, 400))
     for text, expected in ((chain, True), (chain.replace("f0(t) t", "f0(t) nowhere"), False)):
         f = fixture(text)
-        assert sound(f.db, f.file, "f399") is expected
+        assert is_sound(f.db, f.file, "f399") is expected

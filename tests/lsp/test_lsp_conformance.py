@@ -298,6 +298,20 @@ def test_the_greeting_waits_for_no_analysis() -> None:
     assert done.stdout.strip() == "[]"
 
 
+def test_the_first_diagnostics_wait_for_no_feature() -> None:
+    """Not even those of live expressions: `potto.ide` loads a module when one of its questions is asked."""
+    features = ("potto.ide.hover", "potto.ide.actions", "potto.ide.completion", "potto.ide.display")
+    code = (
+        "import sys, potto_lsp.live, potto.checking.check\n"
+        "from potto.ide import live_diagnostics\n"
+        f"print([m for m in {features} if m in sys.modules])\n"
+        "from potto import ide\n"
+        "print([name for name in ide.__all__ if not hasattr(ide, name)])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split("\n") == ["[]", "[]", ""]
+
+
 def test_an_interrupt_ends_it(server: Server) -> None:
     client = server()
     client.process.send_signal(getattr(signal, "CTRL_C_EVENT", signal.SIGINT))

@@ -34,7 +34,7 @@ def seen(lib: Library, offsets: dict[str, list[int]]) -> dict[Hashable, Any]:
         for each in names(lib.db, file):
             found[name, each] = (definition(lib.db, file, each), interface(lib.db, file, each))
         for offset in offsets[name]:
-            found[name, offset] = ide.hover(lib.db, file, offset)
+            found[name, offset] = ide.hover_at(lib.db, file, offset)
     return found
 
 

@@ -12,7 +12,7 @@ FORMATS = "textDocument.hover.contentFormat"
 
 def hover(ask: Ask) -> protocol.Hover | None:
     offset = ask.offset
-    found = ide.hover(ask.db, ask.file, offset)
+    found = ide.hover_at(ask.db, ask.file, offset)
     if found is None:
         return _live(ask, offset)
     values = _values(ask, offset)

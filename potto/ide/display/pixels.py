@@ -16,7 +16,7 @@ from potto.core.printer import format_term
 from potto.core.simplify import simplify
 from potto.core.terms import App, Branch, Delta, Integral, Term, add, const, mul, postorder, substitute
 from potto.elaborate import core
-from potto.ide.hover.derivatives import Functions, condition_infos, conditions, shown_equation, sound
+from potto.ide.hover.derivatives import Functions, condition_infos, conditions, is_sound, shown_equation
 from potto.query import Database, query
 from potto.source import Span
 
@@ -40,7 +40,7 @@ class PixelCondition(Struct, frozen=True):
 def pixel_conditions(db: Database, file: str, name: str, given: Functions = ()) -> tuple[PixelCondition, ...]:
     """The conditions of a definition, and of functions that it is given, that depend on its parameters only, in the
     order of the text."""
-    if not sound(db, file, name):
+    if not is_sound(db, file, name):
         return ()
     elaborated = core(db, file, name)
     spans, params, middles = dict(elaborated.origins), parameters_of(elaborated.term), _middles(elaborated.term)

@@ -37,7 +37,7 @@ WIDTH = 72  # of its lines
 
 
 @query
-def sound(db: Database, file: str, name: str) -> bool:
+def is_sound(db: Database, file: str, name: str) -> bool:
     """Whether the types of a definition and of all that it needs are right: else its terms mean nothing. Of what it
     needs the answer is asked, so that a chain of calls is not followed to its end from each of its links."""
     group = strongly_connected(db, file, name)
@@ -47,13 +47,13 @@ def sound(db: Database, file: str, name: str) -> bool:
         if (None, "deriv") in references(db, target.file, target.name) and is_recursive(db, target.file, target.name):
             return False  # it needs the derivative of itself: symbols for that have no end
     needed = {needed: None for target in group for needed in dependencies(db, target.file, target.name)}
-    return all(sound(db, target.file, target.name) for target in needed if target not in group)
+    return all(is_sound(db, target.file, target.name) for target in needed if target not in group)
 
 
 @query
 def derivative_text(db: Database, file: str, name: str) -> DerivativeText | None:
     """The derivative of a definition in symbols; None for one with errors."""
-    return explain_derivative(db, file, name) if sound(db, file, name) else None
+    return explain_derivative(db, file, name) if is_sound(db, file, name) else None
 
 
 class ConditionInfo(Struct, frozen=True):
@@ -92,7 +92,7 @@ def conditions(db: Database, file: str, name: str, given: Functions = ()) -> tup
             continue
         term = elaborate_expression(db, file, parse_expression(text).expr).term
         names = [node for node in postorder(term) if isinstance(node, Global)]
-        if isinstance(term, Lam | Global | Deriv) and all(sound(db, g.module, g.name) for g in names):
+        if isinstance(term, Lam | Global | Deriv) and all(is_sound(db, g.module, g.name) for g in names):
             functions[parameter] = term
     return conditions_of(
         core(db, file, name).term,
@@ -106,7 +106,7 @@ def conditions(db: Database, file: str, name: str, given: Functions = ()) -> tup
 def condition_infos(db: Database, file: str, name: str, given: Functions = ()) -> tuple[ConditionInfo, ...]:
     """The conditions of a definition, in the order of the text; also those that calls lead to. given: what parameters
     that are functions stand for; without that, calls of these lead to none."""
-    if not sound(db, file, name):
+    if not is_sound(db, file, name):
         return ()
     elaborated = core(db, file, name)
     spans = dict(elaborated.origins)
@@ -317,6 +317,6 @@ def diffeo_markdown(db: Database, file: str, name: str) -> str | None:
 
 def diffeo_of(db: Database, file: str, name: str) -> DiffeoInfo | None:
     """What is known of a diffeomorphism; None for other definitions."""
-    if not isinstance(definition(db, file, name), nodes.DiffeoDefinition) or not sound(db, file, name):
+    if not isinstance(definition(db, file, name), nodes.DiffeoDefinition) or not is_sound(db, file, name):
         return None
     return diffeo_info(db, file, name)

@@ -1,7 +1,7 @@
 """Hover: what a word means, with its type, its derivative's type, and what the calculus knows of it.
 
-Owns `hover`. Parts: definitions and modules here, local names in `hover_locals`, conditions in `hover_conditions`,
-formulas in `explaining`.
+Owns `hover_at`. Parts: definitions and modules here, local names in `local_names`, conditions in `conditions`, formulas
+in `derivatives`.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ _CALL = re.compile(r"\w+\([^()]*\)")  # a formula that can be a factor as it sta
 MOST_NAMES = 40  # definitions of a module that a hover lists
 
 
-def hover(db: Database, file: str, offset: int) -> Hover | None:
+def hover_at(db: Database, file: str, offset: int) -> Hover | None:
     """What there is to say about the word, the keyword or the condition at an offset."""
     found = symbol_at(db, file, offset)
     if found is not None and found.symbol is not None:
