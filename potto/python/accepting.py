@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from potto.kernels.cells import Rows
-from potto.python.arrays import axes_of
+from potto.python.arrays import answers_in, axes_of, halves
 from potto.runtime.answers.estimate import Estimate
 from potto.types.still import values_of
 from potto.types.types import ArrayOf, Dist, Function, Real, RecordName, TupleOf, Type, resolve
@@ -29,9 +29,13 @@ def accepted(argument: Any, type: Type | None) -> Any:
     if argument.__class__ is float or argument.__class__ is int:
         return argument
     found = None if type is None else resolve(type)
+    if isinstance(argument, Estimate) and (found is None or isinstance(found, TupleOf)):
+        argument = _parts_in(argument)
     if isinstance(found, TupleOf) and found.dual and not isinstance(argument, tuple):  # without tangents
         values = resolve(found.items[0])
         found = values if isinstance(values, ArrayOf) else found
+    if found is None and isinstance(argument, tuple):  # of a whole group
+        return tuple(accepted(item, None) for item in argument)
     columns = _columns_of(argument) if record_in(found) is not None else None
     if columns is not None:
         return columns
@@ -44,6 +48,14 @@ def accepted(argument: Any, type: Type | None) -> Any:
     if isinstance(found, TupleOf):
         return _tuple(argument, found)
     return argument
+
+
+def _parts_in(answer: Estimate) -> Any:
+    """What a tuple, or a dual, that was an answer is made of, each part with its own error; any other one as it is."""
+    if answer.tangent is not None:
+        return halves(answer)
+    parts = answers_in(answer)
+    return answer if parts is None else parts
 
 
 def _columns_of(argument: Any) -> dict[str, Any] | None:

@@ -77,6 +77,7 @@ class _Layout:
         self.source = normalized(text)
         self.tokens = tokens
         self.comments = comments
+        self.inset = 0  # levels that are not written so: 1 behind a `def` whose body came to a line of its own
 
     def text(self) -> str:
         """The chunk's text, its lines broken until they fit or can't be broken."""
@@ -117,12 +118,15 @@ class _Layout:
 
     def _indent(self, line: _Line, opened: list[int]) -> int:
         first = self.tokens[line.first]
+        if first.opens:
+            self.inset = 1
+            return _INDENT
         if first.starts:
             return first.level * _INDENT
         if first.token.kind in _CLAUSES:
             return max(1, first.level) * _INDENT
-        if not opened:
-            return max(1, first.level + (not first.body)) * _INDENT  # the bodies of `let`s stand below each other
+        if not opened:  # the bodies of `let`s stand below each other
+            return max(1, first.level + self.inset + (not first.body)) * _INDENT
         closers = 0
         while line.first + closers < line.last and self.tokens[line.first + closers].token.kind in _CLOSERS:
             closers += 1

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from potto.syntax.head import BlockTracker
 from potto.syntax.tokens import KEYWORDS, Token
 
 _ENDS_OPERAND = frozenset({"NAME", "NUMBER", "MEMBER", "FIELD", "RPAR", "RSQB"})
@@ -27,7 +28,7 @@ class Spaced:
     token: Token
     blank: bool
     depth: int
-    """How many brackets are open around it; a bracket itself counts among those outside."""
+    """How far inside it stands: open brackets count 1, integrals and the heads of sums and folds 2."""
     may_break: bool
     """Whether a line that is too long may be broken before it."""
     level: int
@@ -36,14 +37,21 @@ class Spaced:
     """Whether it starts a line of its block."""
     body: bool = False
     """Whether the body of a `let` begins with it."""
+    opens: bool = False
+    """Whether the body of a `def` begins with it on the line of the head."""
 
 
 @dataclass(slots=True)
 class _Bracket:
     kind: str
     bounds: bool
+    """Whether it holds the bounds of an integral."""
+    variables: bool = False
+    """Whether it ends an integral, `d(x, y)`."""
     questions: int = 0
     lets: int = 0
+    inner: int = 0
+    """How much deeper than the bracket itself what comes next is in it."""
     bound: bool = False
     """Whether the next `=` is that of a `fold` or a `with`."""
 
@@ -54,12 +62,15 @@ class _Pass:
     def __init__(self, tokens: list[Token], text: str) -> None:
         self.tokens, self.text = tokens, text
         self.brackets = [_Bracket("", False)]
+        self.depth = 0
         self.level = 0
         self.starts = True
         self.body = False  # whether the `in` of a `let` stands directly before
         self.marked = False  # whether an empty token (the body of a sum or a def) stands directly before
         self.bounds_closed = False
         self.head = tokens[0].kind in ("DEF", "DIFFEODEF") if tokens else False
+        self.blocks = BlockTracker()
+        self.headed = not self.head  # whether a body has begun
         self.loop = False
         self.conditions = _conditions(tokens)
         self.out: list[Spaced] = []
@@ -76,7 +87,15 @@ class _Pass:
                 self.starts = True
             elif token.kind in ("SUMBODY", "COLON"):
                 self.marked = True
+                if token.kind == "COLON":
+                    self.blocks.see(token)
+                else:
+                    self._deeper(-2)
         return self.out
+
+    def _deeper(self, by: int) -> None:
+        self.brackets[-1].inner += by
+        self.depth += by
 
     def _written(self, token: Token) -> None:
         before = self.out[-1].token if self.out else None
@@ -85,29 +104,45 @@ class _Pass:
         kind = token.kind
         if kind in _CLOSERS:
             closed = self.brackets.pop()
+            self.depth -= 1 + closed.inner
         blank = before is not None and not self.starts and self._blank(before, token)
-        depth = len(self.brackets) - 1
-        may_break = before is not None and self._may_break(before, token) and not (self.loop and depth == 0)
-        self.out.append(Spaced(token, blank, depth, may_break, self.level, self.starts, self.body))
+        opens = len(self.brackets) == 1 and kind not in _CLOSERS and self._opens(token)
+        may_break = before is not None and self._may_break(before, token) and not (self.loop and not self.depth)
+        depth = -1 if opens else self.depth - self.bounds_closed
+        self.out.append(Spaced(token, blank, depth, opens or may_break, self.level, self.starts, self.body, opens))
         self.body = self.starts = self.marked = self.bounds_closed = False
         if kind in _OPENERS:
             self.brackets[-1].bound &= before is not None and before.kind == "FOLD"
-            self.brackets.append(_Bracket(kind, before is not None and before.kind == "INTEGRAL"))
+            last = "" if before is None else before.kind
+            self.brackets.append(_Bracket(kind, last == "INTEGRAL", last == "D"))
+            self.depth += 1
         elif kind in _CLOSERS:
             self.bounds_closed = closed.bounds
+            self._deeper(-2 if closed.variables else 0)
         elif kind == "QMARK":
             self.brackets[-1].questions += 1
         elif kind == "COLON" and self.brackets[-1].questions:
             self.brackets[-1].questions -= 1
         elif kind == "LET":
             self.brackets[-1].lets += 1
-        elif kind in ("FOLD", "WITH"):
-            self.brackets[-1].bound = True
+        elif kind == "INTEGRAL":
+            self._deeper(2)
+        elif kind in ("FOLD", "WITH", "SUM"):
+            self.brackets[-1].bound |= kind != "SUM"
+            self._deeper(0 if kind == "WITH" else 2)
         elif before is not None and before.kind == "EQ":
             self.brackets[-1].bound = False
         elif kind == "IN" and self.brackets[-1].lets:
             self.brackets[-1].lets -= 1
             self.body = True
+
+    def _opens(self, token: Token) -> bool:
+        """Whether the body of a `def` begins with a token outside of brackets, on the line of its head."""
+        if self.headed or self.level:
+            return False
+        self.blocks.see(token)
+        self.headed = self.blocks.state == "body"
+        return self.headed
 
     def _is_prefix(self, index: int = -1) -> bool:
         """Whether the sign that was written last (or would be next, at 0) has no operand before it."""
@@ -119,7 +154,7 @@ class _Pass:
 
     def _may_break(self, before: Token, token: Token) -> bool:
         kind = token.kind
-        if before.kind in ("COMMA", "ALSO") or kind in _BREAK_BEFORE:
+        if before.kind in ("COMMA", "ALSO") or kind in _BREAK_BEFORE or self.bounds_closed:
             return True
         if kind == "COLON":
             return self.brackets[-1].questions > 0

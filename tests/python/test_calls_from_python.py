@@ -93,6 +93,37 @@ def test_derivatives_by_records_have_the_form_of_the_record() -> None:
     assert "(c=9" in repr(potto.grad(M.product)({"c": 2, "d": 3}))
 
 
+def test_duals_that_are_answers_are_arguments_of_derivatives() -> None:
+    """The chain rule: what `deriv` answers goes into another one, by the place or the name of its parameter."""
+    m = potto.compile("""
+record Row(x: Real, y: Real)
+def square(t) t^2
+def times(a, b) a*b
+def pair(t) (t, 5)
+def powers(t) [t, t^3]
+def whole(xs: [n] Real, k) k*sum x in xs (x^2)
+def row(t) Row(t, t^2)
+def product(r: Row, k) k*r.x*r.y
+def rows(t) [Row(t, t^2), Row(t^2, 1)]
+def products(rs: [n] Row, k) k*sum r in rs (r.x*r.y)
+""")
+    once = potto.deriv(m.square)((3.0, 1.0))
+    square, times = potto.deriv(m.square), potto.deriv(m.times)
+    for twice in (square(once), square(t=once), square(dt=once)):
+        assert (twice.value, twice.tangent) == (81, 108)  # t^4
+    assert times(once, 2).tangent == times((once, 2)).tangent == times(2, once).tangent == 12
+    assert square(m.pair(3.0)).tangent == 30  # a pair of a program
+    for part, whole, slope in (("powers", "whole", 2 * (2 * 2 + 6 * 2**5)), ("row", "product", 2 * 3 * 2**2),
+                               ("rows", "products", 2 * (3 * 2**2 + 2 * 2))):  # fmt: skip
+        inner, outer = getattr(m, part), getattr(m, whole)
+        assert potto.deriv(outer)(potto.deriv(inner)((2.0, 1.0)), 2).tangent == slope
+        assert potto.deriv(outer)(inner(2.0), (2.0, 1.0)).tangent == outer(inner(2.0), 1).value
+    by_name = potto.deriv(m.whole)(xs=(np.array([1.0, 2.0]), np.array([1.0, 0.0])), k=2)
+    assert (by_name.value, by_name.tangent) == (10, 4)
+    with pytest.raises(potto.PottoError, match="P0615"):
+        square(m.square(3.0))
+
+
 def test_gradients_of_gradients() -> None:
     """a^2 t^2/2: by a, a t^2; by t, a^2 t; then t^2, 2 a t, a^2."""
     once = potto.grad(potto.grad(M.g))(2, 0.5)

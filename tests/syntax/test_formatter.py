@@ -186,6 +186,17 @@ def test_long_lines_are_broken_as_far_out_as_can_be() -> None:
     assert max(map(len, out.split("\n"))) <= 100
 
 
+def test_bodies_come_to_a_line_of_their_own_before_bounds_ranges_and_variables_are_broken() -> None:
+    head = "def pixel(mesh: [n] ((Real, Real), (Real, Real), (Real, Real)), grey: [n] Real, px, py, h)"
+    bounds = "integral ([px, px + h], [py, py + h])"
+    summed = "sum i in 0..n - 1 (grey[i] * inside(mesh[i], x, y)) d(x, y)"
+    laid_out = f"{head}\n    {bounds}\n        {summed}\n"
+    assert formatted(f"{head} {bounds} {summed}") == laid_out == formatted(laid_out)
+    first, second = "weights[i] * (observations[i + 1] - observations[i])^2", "integral [0, c] x * [x < t] d(x)"
+    loop = f"sum i in 0..number_of_them - 2 ({first}\n        * {second})"
+    assert formatted(f"def loss(c, t): {loop}") == f"def loss(c, t):\n    {loop}\n"
+
+
 def test_broken_chunks_are_kept_as_they_are() -> None:
     text = "x   = (1,\n      2\ndef f(x)  x+\n\n\n\n\ny=1\n"
     assert format_source(text) == "x   = (1,\n      2\ndef f(x)  x+\n\n\ny = 1\n"
