@@ -6,7 +6,7 @@ them. The integrator and the sampler write; the runtime makes them a part of an 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import Any
@@ -128,11 +128,19 @@ class Costs(Struct):
         seen.met = seen.met or bool(np.any(inside))
         seen.moves = seen.moves or any(bool(np.any(inside & (s != 0))) for s in speeds)
 
-    def told(self) -> dict[str, Any]:
-        """As a part of an estimate's `stats`."""
-        from potto.core.printer import abridged
+    def rename(self, known: frozenset[Term], change: Callable[[Term], Term]) -> None:
+        """Give other terms to the surfaces that were met beyond those known; those that become the same are one."""
+        met, self.surfaces = self.surfaces, {s: seen for s, seen in self.surfaces.items() if s in known}
+        for surface, seen in met.items():
+            if surface not in known:
+                before = self.surfaces.get(term := change(surface), Surface())
+                self.surfaces[term] = Surface(
+                    before.met or seen.met, before.moves or seen.moves, before.asked or seen.asked
+                )
 
-        surfaces = [{"surface": f"{abridged(s)} = 0", "kept": seen.kept, "why": seen.why}
+    def told(self, written: Callable[[Term], str]) -> dict[str, Any]:
+        """As a part of an estimate's `stats`; `written`: a surface as the program would write it."""
+        surfaces = [{"surface": f"{written(s)} = 0", "kept": seen.kept, "why": seen.why}
                     for s, seen in self.surfaces.items()]  # fmt: skip
         return {
             "interior evaluations": self.interior,

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 
 from potto.calculus.surfaces.discontinuities import TooDeep
+from potto.core.printer import abridged, format_term
 from potto.core.terms import Data, Integral, Sum, Term
 from potto.diagnostics import PottoError, Related
 from potto.integrate.events import INFINITE, ROUGH, Shortfall
@@ -183,9 +184,12 @@ def report(value: Value, machine: Machine, clock: Clock) -> Estimate:
     """The estimate of a value; of its tangents the first is told, and all count for whether it converged."""
     record = machine.record
     method = "exact" if not record.methods else "+".join(sorted(record.methods))
+    stats = stats_of(record, clock)
+    if record.costs is not None:
+        stats |= record.costs.told(lambda surface: abridged(_as_named(surface, machine)))
     answer = partial(
         Estimate, evals=record.evaluations, seconds=clock.seconds, compile_seconds=clock.spent,
-        plan_seconds=clock.planning, method=method, notes=tuple(_notes(machine)), stats=stats_of(record, clock),
+        plan_seconds=clock.planning, method=method, notes=tuple(_notes(machine)), stats=stats,
     )  # fmt: skip
     if isinstance(value, Closure):
         kind = "derivative of a function" if isinstance(value, Derivative) else "function"
@@ -232,8 +236,6 @@ def stats_of(record: Record, clock: Clock) -> dict[str, Any]:
         stats["integrals without a plan"] = record.seen
     if record.culled:
         stats["integrals culled"] = record.culled
-    if record.costs is not None:
-        stats |= record.costs.told()
     return stats
 
 
@@ -275,19 +277,19 @@ def _missing(flat: list[tuple[Any, Any]], machine: Machine) -> Shortfalls:
     return {why: where for why, where in reasons.items() if np.any(where)}
 
 
-def _notes(machine: Machine) -> list[OneSided]:
-    if not machine.record.edges:
-        return []
+def _as_named(term: Term, machine: Machine) -> Term:
+    """A term of an integral as the program would write it."""
     from potto.runtime.integration.arrays import in_places  # loaded with the first integral: most answers have no notes
 
-    def written(term: Term) -> str:
-        return machine.linker.written(in_places(term))
+    return machine.linker.named(in_places(term))
 
+
+def _notes(machine: Machine) -> list[OneSided]:
     out: list[OneSided] = []
     for edge in machine.record.edges:
         what = edge.cause
-        other = None if what.other is None else f"{written(what.other)} = 0"
-        surface = None if what.surface is None else f"{written(what.surface)} = 0"
+        surface, other = (None if x is None else f"{format_term(_as_named(x, machine))} = 0"
+                          for x in (what.surface, what.other))  # fmt: skip
         backward, forward, before, beyond = map(np.squeeze, edge.sides)
         note = OneSided(
             what.variable, surface, backward, forward, other, what.fold, before, beyond, what.kink, what.along

@@ -140,3 +140,26 @@ def test_members_that_are_cut_alike_tell_what_they_met() -> None:
     assert sum(why.startswith("nothing that is differentiated") for why in told.values()) == 1
     # where the line leaves the square beyond x = s there is one lit cell, else a second below its end
     assert stats["cells"] == 45 + 2 * 45 and stats["boundary evaluations"] == 0
+
+
+def test_surfaces_have_the_names_that_the_program_has() -> None:
+    """Of what an integral reads of arrays and records it has numbers alone; each is told by where it was read."""
+    m = potto.compile("""
+record Camera(eye: (Real, Real), focal: Real)
+def first(xs: [n] Real, t) integral [0, 1] [x < xs[0]*t] d(x)
+def each(xs: [n] Real, t) integral [0, 1] sum i in 0..n-1 ([x < xs[i]*t]) d(x)
+def seen(c: Camera, t) integral [0, 1] [x < c.eye.y]*[x < c.focal*t] d(x)
+def nested(xs: [n] Real, t) integral [0, 1] (integral [0, 1] [y < xs[0]*x] d(y))*[x < xs[1]*t] d(x)
+def twice(xs: [n] Real, ys: [n] Real, t) first(xs, t) + first(ys, t)
+""")
+    cases = (
+        (m.first, ([0.3, 0.4],), {"xs[0]*t - x"}),
+        (m.each, ([0.3, 0.4],), {"xs[i]*t - x"}),
+        (m.seen, (((0.1, 0.2), 0.3),), {"c.eye.1 - x", "c.focal*t - x"}),
+        (m.nested, ([0.3, 0.4],), {"xs[1]*t - x", "xs[0]*x - y"}),
+        (m.twice, ([0.3, 0.4], [0.5, 0.6]), {"xs[0]*t - x"}),
+    )
+    for function, arguments, surfaces in cases:
+        with potto.counting():
+            stats = function(*arguments, 0.9).stats
+        assert {entry["surface"] for entry in stats["surfaces"]} == {f"{surface} = 0" for surface in surfaces}

@@ -10,7 +10,6 @@ from typing import Any
 
 from potto.calculus.inlining.numbers import with_numbers
 from potto.calculus.surfaces.branch_cuts import opened
-from potto.core.printer import format_term
 from potto.core.terms import Data, Deriv, Global, Integral, Lam, Term, postorder
 from potto.diagnostics import PottoError
 from potto.integrate.outline import Outlines
@@ -60,9 +59,9 @@ class Linker:
             counts.linked += 1
         return self.terms[key]
 
-    def written(self, term: Term) -> str:
-        """A term as the program would write it."""
-        return format_term(term if self._named is None else self._named(term, self.terms))
+    def named(self, term: Term) -> Term:
+        """A term with the names of the program's fields."""
+        return term if self._named is None else self._named(term, self.terms)
 
     def ready(self, term: Term) -> Term:
         """The term as it is evaluated: with branch cuts told, and numbers in the place of their names."""

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from msgspec import Struct, field
 
+from potto.core.terms import Term
 from potto.integrate import costs
 from potto.integrate.costs import Costs
 from potto.integrate.events import Events, OneSidedDerivatives, Shortfall, TwoSided
@@ -148,6 +149,10 @@ class Record(Struct):
     @property
     def effort(self) -> int:
         return self.evaluations + self.cells
+
+    def surfaces(self) -> tuple[int, frozenset[Term]]:
+        """Those met so far: how many have two derivatives, and which are told of in `costs`."""
+        return len(self.edges), frozenset(() if self.costs is None else self.costs.surfaces)
 
     def meet(self, edge: OneSidedDerivatives) -> None:
         """Note something that has two derivatives."""

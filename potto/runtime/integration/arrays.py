@@ -17,13 +17,13 @@ from potto.calculus.inlining.reads import Access, hoisted
 from potto.calculus.solving.pivots import NoClosedForm
 from potto.core.terms import Index, Integral, Term, function_of, proj, substitute, tuple_, var
 from potto.diagnostics import PottoError, declare
-from potto.integrate.events import OneSidedDerivatives
 from potto.kernels import errors
 from potto.kernels.cells import Cell, Env, Number, Value
 from potto.kernels.making import making
 from potto.runtime.evaluation.functions import Closure
 from potto.runtime.evaluation.machine import Machine
 from potto.runtime.evaluation.reach import Reach, kept
+from potto.runtime.evaluation.record import Record
 from potto.runtime.integration.uncounted import not_found
 
 TOO_LONG = declare("P0515", "a loop under an integral is too long to be written out")
@@ -100,9 +100,14 @@ class Differ(Exception):
         self.ends = np.asarray(ends)
 
 
-def as_written(edges: list[OneSidedDerivatives], known: int, read: Read) -> None:
-    """In what was met beyond what is known, put what names stand for: the program has no others."""
-    for place in range(known, len(edges) if read else 0):
+def as_written(record: Record, known: tuple[int, frozenset[Term]], read: Read) -> None:
+    """In the surfaces that a record has beyond those known, put what names stand for: the program has no others."""
+    if not read:
+        return
+    if record.costs is not None:
+        record.costs.rename(known[1], lambda surface: substitute(surface, read))
+    edges = record.edges
+    for place in range(known[0], len(edges)):
         cause = edges[place].cause
         surface, other = (None if x is None else substitute(x, read) for x in (cause.surface, cause.other))
         edges[place] = replace(edges[place], cause=replace(cause, surface=surface, other=other))

@@ -54,9 +54,9 @@ def integral(machine: Machine, term: Integral, env: dict[str, Value]) -> Value:
     if different is not None:
         return _by_choice(machine, term, env, different)
     term, env = in_numbers(term, env)
-    known = len(machine.record.edges)
+    known = machine.record.surfaces()
     value = locally(machine, env, lambda own, here: _of_numbers(own, term, here))
-    as_written(machine.record.edges, known, read)
+    as_written(machine.record, known, read)
     return value
 
 
