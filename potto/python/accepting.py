@@ -18,6 +18,7 @@ import numpy as np
 from potto.kernels.cells import Rows
 from potto.python.arrays import answers_in, axes_of, halves
 from potto.runtime.answers.estimate import Estimate
+from potto.runtime.answers.named import alike
 from potto.types.still import values_of
 from potto.types.types import ArrayOf, Dist, Function, Real, RecordName, TupleOf, Type, resolve
 
@@ -174,7 +175,7 @@ def as_given(argument: Any, part: Any, type: Type | None) -> Any:
         fields = zip(_fields(found, found.record), part, strict=True)
         return {name: as_given(argument[name], item, its) for (name, its), item in fields}
     if isinstance(argument, tuple | list) and len(argument) == len(part):
-        return tuple(as_given(*three) for three in zip(argument, part, found.items, strict=True))
+        return alike(part, [as_given(*three) for three in zip(argument, part, found.items, strict=True)])
     return part
 
 

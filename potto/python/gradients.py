@@ -29,6 +29,7 @@ from potto.python.moving import each_moving, moved, own, size, with_own, with_pl
 from potto.python.named_parameters import Names, parameters_to_vary
 from potto.python.remade import remade
 from potto.python.sided import with_sides
+from potto.runtime.answers.arithmetic import Pair
 from potto.runtime.answers.estimate import Estimate
 from potto.runtime.answers.named import named
 from potto.runtime.answers.shown import named_answer
@@ -47,9 +48,19 @@ NOTHING: Swept = (None, None)
 
 
 class Gradient(Estimate, frozen=True, eq=False):
-    """An estimate with derivatives by several parameters: `gradient["c"]`, or `tangent` for all of them."""
+    """An estimate with derivatives by several parameters: `gradient["c"]`, or `tangent` for all of them.
+
+    as_records: the derivatives and their errors as they are shown, where records were given as dicts.
+    """
 
     wrt: tuple[str, ...] = ()
+    as_records: Any = None
+
+    @property
+    def _shown(self) -> Pair:
+        if self.as_records is None:
+            return super()._shown
+        return (self.value, self.as_records[0]), (self.error, self.as_records[1])
 
     def __getitem__(self, name: Any) -> Any:
         """The derivative by a parameter; at a place, the value (0) or the derivatives (1) as an estimate."""
@@ -68,8 +79,9 @@ def grad(function: Function | GradientFunction, wrt: Names = None) -> Any:
     """The function with its derivatives by the parameters named in `wrt`, or by the first one.
 
     It takes plain numbers. In the answer, `tangent` is the derivative by the one parameter, or a tuple of them in the
-    order of `wrt`; `answer["c"]` is the one by `c`. The derivative by a tuple is a tuple, that by a record that is
-    given as a dict a dict. Of `grad(f)` it is the second derivative: `value` is what `grad(f)` has as `tangent`.
+    order of `wrt`; `answer["c"]` is the one by `c`. The derivative by a tuple is a tuple, that by a record a tuple with
+    its fields, or a dict where the record is given as one. Of `grad(f)` it is the second derivative: `value` is what
+    `grad(f)` has as `tangent`.
     Raises PottoError if the function has no such parameter, or one of them is not a number.
     """
     if isinstance(function, GradientFunction):
@@ -214,18 +226,25 @@ def gradient(call: Call, arguments: Sequence[tuple[str, Value]], wrt: tuple[str,
 
 
 def in_given_form(found: Gradient, function: Function, args: tuple[Any, ...], kwargs: dict[str, Any]) -> Gradient:
-    """The gradient in the form of what was given: by a record that is a dict a dict, by a tuple that is an array an
-    array."""
+    """The gradient in the form of what was given: by a record a record, or a dict where that is one, by a tuple that is
+    an array an array."""
     given = dict(bound(function, args, kwargs))
-    if not any(isinstance(argument, Mapping | tuple | list | np.ndarray) for argument in given.values()):
+    if all(isinstance(argument, float | int) for argument in given.values()):
         return found
+    types = {name: function.type_of(name) for name in found.wrt}
 
-    def form(parts: Any) -> Any:
-        each = [as_given(given.get(name), part, function.type_of(name))
+    def form(parts: Any, own: Callable[[str, Any], Any]) -> Any:
+        each = [own(name, part)
                 for name, part in zip(found.wrt, parts if len(found.wrt) > 1 else (parts,), strict=True)]  # fmt: skip
         return tuple(each) if len(each) > 1 else each[0]
 
-    return replace(found, tangent=form(found.tangent), tangent_error=form(found.tangent_error))
+    def as_it_was(name: str, part: Any) -> Any:
+        return as_given(given.get(name), named(part, types[name]), types[name])
+
+    sides = [form(side, as_it_was) for side in (found.tangent, found.tangent_error)]
+    dicts = any(isinstance(given.get(name), Mapping | list) for name in found.wrt)
+    records = [form(side, lambda name, part: named(part, types[name])) for side in sides] if dicts else None
+    return replace(found, tangent=sides[0], tangent_error=sides[1], as_records=records)
 
 
 class _Run:

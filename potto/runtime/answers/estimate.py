@@ -87,7 +87,7 @@ def _number(x: Any, error: Any) -> str:
 
 
 # What `summary` shows otherwise, or not at all.
-UNSHOWN = ("notes", "stats", "shortfalls")
+UNSHOWN = ("notes", "stats", "shortfalls", "as_records")
 
 
 class Estimate(Operators, WithFields, Struct, frozen=True, eq=False):
@@ -299,11 +299,7 @@ class Estimate(Operators, WithFields, Struct, frozen=True, eq=False):
 
     def __repr__(self) -> str:
         """`0.349858807576(4)  5 evaluations  0.1 ms`."""
-        text = self.text
-        if text is None:
-            text = concisely(self.value, self.error)
-            if self.tangent is not None:
-                text = format_tuple([text, concisely(self.tangent, self.tangent_error)])
+        text = concisely(*self._shown) if self.text is None else self.text
         return f"{led(text, self.converged or self.text is not None)}  {self._cost}"
 
     def _repr_html_(self) -> str:

@@ -62,9 +62,11 @@ class WithFields:
 
 
 def named(value: Any, type: Type) -> Any:
-    """A value of a type, with what is a record in it by its names."""
+    """A value of a type, with what is a record in it by its names; also one whose records are dicts."""
     if not has_records(type):
         return value
+    if isinstance(value, dict) and isinstance(type, TupleOf) and type.record is not None:
+        value = tuple([value[field] for field in type.record.fields])
     if isinstance(type, TupleOf) and isinstance(value, tuple) and len(value) == len(type.items):
         parts = [named(part, item) for part, item in zip(value, type.items, strict=True)]
         return tuple(parts) if type.record is None else Named(_called(type.record.name), type.record.fields, parts)
