@@ -22,7 +22,7 @@ from potto_lsp.analysis import Analysis
 from potto_lsp.client import Client
 from potto_lsp.documents import Document
 from potto_lsp.publishing import Publisher
-from potto_lsp.text import Text
+from potto_lsp.text import DocumentText
 
 ROUNDS = 60
 Times = tuple[float, float]  # ms until what was waited for is told, and until all is done
@@ -47,7 +47,7 @@ class Session:
     def put(self, name: str, text: str) -> None:
         self.version += 1
         uri = (self.folder / f"{name}.po").as_uri()
-        self.analysis.put(Document(uri, "potto", self.version, Text(text, "utf-16")))
+        self.analysis.put(Document(uri, "potto", self.version, DocumentText(text, "utf-16")))
 
     def open(self, name: str, text: str) -> None:
         self.put(name, text)

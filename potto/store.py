@@ -48,7 +48,7 @@ _USED = 3600.0  # seconds: that an entry was used is noted no more often
 _ABANDONED = 3600.0  # seconds after which nobody still writes a temporary file
 
 
-class Kind(Struct, frozen=True):
+class KeptKind(Struct, frozen=True):
     """How much of one kind is kept."""
 
     name: str
@@ -56,11 +56,11 @@ class Kind(Struct, frozen=True):
     size: int  # bytes, of the files
 
 
-class Report(Struct, frozen=True):
+class StoreReport(Struct, frozen=True):
     """What is kept. folder: None if the store is turned off; complaint: why nothing is kept although it is on."""
 
     folder: Path | None
-    kinds: tuple[Kind, ...]
+    kinds: tuple[KeptKind, ...]
     bound: int  # bytes
     complaint: str | None
 
@@ -142,16 +142,16 @@ def refused() -> str | None:
     return complaint() if _judged.cache_info().currsize else None
 
 
-def report() -> Report:
+def report() -> StoreReport:
     """What is kept now."""
     base = cache_folder()
     if base is None:
-        return Report(None, (), bound(), None)
+        return StoreReport(None, (), bound(), None)
     folder, sizes = os.path.join(base, _FOLDER), dict[str, list[int]]()
     for kind, _, status in _entries(folder):
         sizes.setdefault(kind, []).append(status.st_size)
-    kinds = tuple(Kind(kind, len(found), sum(found)) for kind, found in sorted(sizes.items()))
-    return Report(base, kinds, bound(), complaint() or _not_written(folder))
+    kinds = tuple(KeptKind(kind, len(found), sum(found)) for kind, found in sorted(sizes.items()))
+    return StoreReport(base, kinds, bound(), complaint() or _not_written(folder))
 
 
 def clear() -> None:

@@ -19,7 +19,7 @@ from potto.projects.project import Project, Projects, read_project
 from potto.query import Database
 from potto.reports.render import Located
 from potto_lsp.documents import Document
-from potto_lsp.text import Encoding, Text
+from potto_lsp.text import DocumentText, Encoding
 from potto_lsp.uris import to_key, to_uri
 from potto_lsp.verdicts import Verdicts
 
@@ -48,7 +48,7 @@ class Analysis:
         self._settings: Mapping[str, Any] = {}
         self._levels: dict[str, Mapping[str, str]] = {}
         self._documents: dict[str, Document] = {}
-        self._texts: dict[str, Text] = {}
+        self._texts: dict[str, DocumentText] = {}
         self._failing: dict[tuple[str, str], str] = {}
         self._verdicts = Verdicts(self.db)
         self._checked: set[str] = set()  # files asked for; only the first answer may come from an earlier session
@@ -128,7 +128,7 @@ class Analysis:
         document = self._documents.get(key)
         return document.uri if document is not None else to_uri(key)
 
-    def text(self, key: str) -> Text:
+    def text(self, key: str) -> DocumentText:
         """The text of a file with its lines; an empty one if there is none."""
         document = self._documents.get(key)
         if document is not None:
@@ -137,7 +137,7 @@ class Analysis:
         written = "" if found is None else found.text
         known = self._texts.get(key)
         if known is None or known.text != written:
-            known = self._texts[key] = Text(written, self.encoding)
+            known = self._texts[key] = DocumentText(written, self.encoding)
         return known
 
     def forget_trees(self) -> None:

@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from potto_lsp.analysis import Analysis
     from potto_lsp.client import Client
     from potto_lsp.documents import Document
-    from potto_lsp.session import Session
-    from potto_lsp.text import Text
+    from potto_lsp.session import ClientSession
+    from potto_lsp.text import DocumentText
 
 
 def uri_of(params: Any) -> str | None:
@@ -47,7 +47,7 @@ def about(params: Any) -> str | None:
 class Ask(Struct, dict=True):
     """One request."""
 
-    session: Session
+    session: ClientSession
     params: Any
 
     @property
@@ -78,7 +78,7 @@ class Ask(Struct, dict=True):
         return self.analysis.document(self.file)
 
     @property
-    def text(self) -> Text:
+    def text(self) -> DocumentText:
         return self.analysis.text(self.file)
 
     @property

@@ -1,10 +1,10 @@
-"""pygls, where it is strict enough, and what is done here in its place. Owns `Protocol` and `Carrier`.
+"""pygls, where it is strict enough, and what is done here in its place. Owns `Protocol` and `StreamServer`.
 
 Taken from pygls: the server and its table of handlers, the way from a message to its handler, answers as futures and
 their cancellation, requests and notifications to the client, the codes of errors. Of pygls 2.1.1 does not hold:
 
 - `io_.run` knows `Content-Length: n` in exactly that form, answers nothing to what is not JSON and takes a body that
-  ends early for a message: `Carrier.carry` is given what `wire.messages` reads.
+  ends early for a message: `StreamServer.carry` is given what `wire.messages` reads.
 - Importing it takes as long as checking a hundred definitions: see `lazy_types` and `later`.
 - `structure_message` is called for every object inside of a message, and makes classes that are taken apart again:
   messages stay plain JSON here.
@@ -58,7 +58,7 @@ def settle(future: Future[Any], result: Any = None, error: RequestError | None =
 class Protocol(JsonRPCProtocol):
     """JSON-RPC to the letter. `_server` knows what is allowed at this stage of the session."""
 
-    _server: Carrier
+    _server: StreamServer
 
     def __init__(self, server: JsonRPCServer, converter: Converter) -> None:
         super().__init__(server, converter)
@@ -185,7 +185,7 @@ def _no_converter() -> Converter:
     return cast("Converter", None)
 
 
-class Carrier(JsonRPCServer):
+class StreamServer(JsonRPCServer):
     """A server of pygls that reads one stream on the thread that runs it, and knows when a session may ask what."""
 
     protocol: Protocol

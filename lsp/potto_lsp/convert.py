@@ -10,7 +10,7 @@ from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 from potto_lsp import protocol
-from potto_lsp.text import Text
+from potto_lsp.text import DocumentText
 
 if TYPE_CHECKING:
     from potto.diagnostics import Diagnostic, Related
@@ -25,13 +25,13 @@ SEVERITIES = {"error": 1, "warning": 2, "info": 3, "hint": 4}
 TAGS = {"unnecessary": 1, "deprecated": 2}
 
 
-def position(text: Text, offset: int) -> protocol.Position:
+def position(text: DocumentText, offset: int) -> protocol.Position:
     """A position of a text."""
     line, character = text.position(offset)
     return {"line": line, "character": character}
 
 
-def range_of(text: Text, span: Span) -> protocol.Range:
+def range_of(text: DocumentText, span: Span) -> protocol.Range:
     """A range of a text."""
     return {"start": position(text, span.start), "end": position(text, span.end)}
 
@@ -66,7 +66,7 @@ def plain(text: str) -> str:
     return "\n".join("" if line == "---" else line for line in unmarked)
 
 
-def text_edits(text: Text, edits: Iterable[Edit]) -> list[protocol.TextEdit]:
+def text_edits(text: DocumentText, edits: Iterable[Edit]) -> list[protocol.TextEdit]:
     """Edits of one text."""
     return [{"range": range_of(text, edit.span), "newText": edit.text} for edit in edits]
 
@@ -100,13 +100,15 @@ def _file_rename(analysis: Analysis, rename: FileRename) -> dict[str, Any]:
 
 
 def diagnostics(
-    analysis: Analysis, client: Client, found: Iterable[Located], file: str, text: Text
+    analysis: Analysis, client: Client, found: Iterable[Located], file: str, text: DocumentText
 ) -> list[protocol.Diagnostic]:
     """What there is to say about a file with this text."""
     return [_diagnostic(analysis, client, located.diagnostic, file, text) for located in found]
 
 
-def _diagnostic(analysis: Analysis, client: Client, said: Diagnostic, file: str, text: Text) -> protocol.Diagnostic:
+def _diagnostic(
+    analysis: Analysis, client: Client, said: Diagnostic, file: str, text: DocumentText
+) -> protocol.Diagnostic:
     ways = ("textDocument.publishDiagnostics", "textDocument.diagnostic")
     tells = any(client.can(f"{way}.relatedInformation") for way in ways)
     result: protocol.Diagnostic = {

@@ -12,7 +12,7 @@ from typing import Any
 from msgspec import Struct
 
 from potto_lsp.errors import InvalidParams
-from potto_lsp.text import Encoding, Text
+from potto_lsp.text import DocumentText, Encoding
 
 logger = logging.getLogger(__name__)
 
@@ -23,7 +23,7 @@ class Document(Struct, frozen=True):
     uri: str
     language: str
     version: int | None
-    text: Text
+    text: DocumentText
 
 
 class Documents:
@@ -47,7 +47,7 @@ class Documents:
         uri, text = item["uri"], item["text"]
         if not isinstance(uri, str) or not isinstance(text, str):
             raise InvalidParams("a document has a URI and a text")
-        document = Document(uri, str(item.get("languageId", "")), _version(item), Text(text, self.encoding))
+        document = Document(uri, str(item.get("languageId", "")), _version(item), DocumentText(text, self.encoding))
         self._open[uri] = document
         return document
 
@@ -80,13 +80,13 @@ def _version(item: Mapping[str, Any]) -> int | None:
     return version if isinstance(version, int) else None
 
 
-def _changed(text: Text, change: Mapping[str, Any]) -> Text:
+def _changed(text: DocumentText, change: Mapping[str, Any]) -> DocumentText:
     inserted = change["text"]
     if not isinstance(inserted, str):
         raise InvalidParams("a change has a text")
     where = change.get("range")
     if where is None:
-        return Text(inserted, text.encoding)
+        return DocumentText(inserted, text.encoding)
     start, end = where["start"], where["end"]
     return text.replaced(
         text.offset(start["line"], start["character"]), text.offset(end["line"], end["character"]), inserted

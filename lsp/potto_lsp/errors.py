@@ -30,7 +30,7 @@ class InvalidParams(RequestError):
         super().__init__(INVALID_PARAMS, message)
 
 
-class Refusal(RequestError):
+class RequestRefused(RequestError):
     """A valid request that is not carried out, for a reason that the user should read."""
 
     def __init__(self, message: str) -> None:

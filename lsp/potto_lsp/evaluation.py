@@ -1,7 +1,7 @@
 """The server's side of the evaluation process, which is started when first needed and given one task at a time.
 
-Owns `Evaluator` and `Task`. A task has limits of time and memory and can be cancelled: the process is interrupted, and
-killed if it doesn't react. If it dies, the next task starts a new one.
+Owns `Evaluator` and `EvaluationTask`. A task has limits of time and memory and can be cancelled: the process is
+interrupted, and killed if it doesn't react. If it dies, the next task starts a new one.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ PATIENCE = 0.3  # seconds that a task may run on while a more urgent one waits
 COMMAND, LIVE, POINTS = 0, 1, 2  # the urgency of tasks: what a user asked for comes first
 
 
-class Task(Struct, eq=False):
+class EvaluationTask(Struct, eq=False):
     """Something to evaluate. `done` is called once, on the evaluator's thread, with either `result` or `error`."""
 
     do: str
@@ -58,14 +58,14 @@ class Evaluator:
 
     def __init__(self, analysis: Analysis) -> None:
         self._analysis = analysis
-        self._tasks: PriorityQueue[tuple[int, int, Task]] = PriorityQueue()
+        self._tasks: PriorityQueue[tuple[int, int, EvaluationTask]] = PriorityQueue()
         self._thread: Thread | None = None
         self._process: subprocess.Popen[str] | None = None
         self._said: SimpleQueue[Mapping[str, Any] | None] = SimpleQueue()
         self._sent: dict[str, str] = {}
         self._ids, self._order = itertools.count(1), itertools.count(1)
 
-    def put(self, task: Task) -> Task:
+    def put(self, task: EvaluationTask) -> EvaluationTask:
         """Queue a task, with the texts as they are now. For the thread that owns the database."""
         analysis = self._analysis
         task.texts = {key: document.text.text for key, document in analysis.documents.items()}
@@ -83,7 +83,7 @@ class Evaluator:
         value = self._analysis.settings.get(name)
         return float(value) if isinstance(value, int | float) and value > 0 else default
 
-    def _add(self, task: Task) -> None:
+    def _add(self, task: EvaluationTask) -> None:
         self._tasks.put((task.urgency, next(self._order), task))
 
     @property
@@ -112,7 +112,7 @@ class Evaluator:
                 answer = {"error": "the evaluation process failed"}
             task.done(answer)
 
-    def _answered(self, task: Task) -> Mapping[str, Any]:
+    def _answered(self, task: EvaluationTask) -> Mapping[str, Any]:
         """The answer to a task. If the process ends, something else may have killed it, so a new one is asked; if that
         ends too, the task is to blame."""
         for _ in range(2):
@@ -122,7 +122,7 @@ class Evaluator:
                 self._end()
         return {"error": "the evaluation process ended unexpectedly"}
 
-    def _answer(self, task: Task) -> Mapping[str, Any]:
+    def _answer(self, task: EvaluationTask) -> Mapping[str, Any]:
         process = self._running()
         if process is None:
             return {"error": "the evaluation process does not start"}
@@ -140,7 +140,7 @@ class Evaluator:
             raise Ended from error
         return self._await(id, task)
 
-    def _await(self, id: int, task: Task) -> Mapping[str, Any]:
+    def _await(self, id: int, task: EvaluationTask) -> Mapping[str, Any]:
         begun = time.monotonic()
         deadline = begun + task.limit
         while True:
@@ -161,7 +161,7 @@ class Evaluator:
             if said.get("id") == id:
                 return said
 
-    def _is_pressed(self, task: Task) -> bool:
+    def _is_pressed(self, task: EvaluationTask) -> bool:
         """Whether something more urgent is waiting."""
         with self._tasks.mutex:
             return bool(self._tasks.queue) and self._tasks.queue[0][0] < task.urgency

@@ -26,11 +26,11 @@ from potto.query import Database, query
 from potto.reports.render import Located
 from potto.source import Span
 from potto.syntax import parse_expression
-from potto_lsp.evaluation import LIVE, POINTS, Task
+from potto_lsp.evaluation import LIVE, POINTS, EvaluationTask
 
 if TYPE_CHECKING:
     from potto.syntax.live import Live
-    from potto_lsp.session import Session
+    from potto_lsp.session import ClientSession
 
 MOST = 200  # live expressions of one file that are evaluated
 TOGETHER = 20  # definitions whose points are asked for together
@@ -117,13 +117,13 @@ def point_keys(db: Database, file: str, name: str) -> Keys:
     return tuple([_point_key(db, file, point) for point in _asked_points(db, file, name)])
 
 
-def _asked_points(db: Database, file: str, name: str) -> tuple[ide.Point, ...]:
+def _asked_points(db: Database, file: str, name: str) -> tuple[ide.CallPoint, ...]:
     if name not in names(db, file) or not ide.is_sound(db, file, name):
         return ()
     return tuple(point for point in ide.points(db, file, name) if not point.chosen)
 
 
-def _point_key(db: Database, file: str, point: ide.Point) -> Key:
+def _point_key(db: Database, file: str, point: ide.CallPoint) -> Key:
     return Key("point", file, point.text, (("slopes", point.slopes),), fingerprint(db, file, point.text))
 
 
@@ -152,7 +152,7 @@ class Value(Struct, frozen=True):
         return "; ".join(part for part in (error, held) if part)
 
 
-def shown(point: ide.Point, value: Value) -> str:
+def shown(point: ide.CallPoint, value: Value) -> str:
     """A point in markdown: the value and the slopes there, with error bars; nothing if there is no value."""
     if not value.result or value.result.get("error") is None:
         return ""
@@ -164,10 +164,10 @@ def shown(point: ide.Point, value: Value) -> str:
 class LiveValues:
     """The values of the expressions in shown files. For the thread that owns the database."""
 
-    def __init__(self, session: Session) -> None:
+    def __init__(self, session: ClientSession) -> None:
         self._session = session
         self._values: dict[Key, Value] = {}
-        self._waiting: dict[Key, Task] = {}
+        self._waiting: dict[Key, EvaluationTask] = {}
         self._seen: tuple[Keys, ...] = ()  # what was wanted when it was last looked at
         self._shown: set[str] = set()
         self._asked: dict[tuple[str, str], None] = {}
@@ -189,7 +189,7 @@ class LiveValues:
         """Whether anything is evaluated without being asked for."""
         return self._session.analysis.settings.get("live.enabled") is not False
 
-    def at_points(self, file: str, name: str) -> list[tuple[ide.Point, Value]]:
+    def at_points(self, file: str, name: str) -> list[tuple[ide.CallPoint, Value]]:
         """What is known of a definition at its points. From now on they are evaluated."""
         found = [(point, self._values.get(key)) for point, key in self._points(file, name)]
         if any(value is None for _, value in found) and (file, name) not in self._asked:
@@ -227,7 +227,7 @@ class LiveValues:
         db = self._session.analysis.db
         return zip(ide.live_in(db, file), live_keys(db, file))
 
-    def _points(self, file: str, name: str) -> Iterator[tuple[ide.Point, Key]]:
+    def _points(self, file: str, name: str) -> Iterator[tuple[ide.CallPoint, Key]]:
         db = self._session.analysis.db
         return zip(_asked_points(db, file, name), point_keys(db, file, name))
 
@@ -256,11 +256,13 @@ class LiveValues:
                 if key.do == do and key not in self._values and key not in self._waiting:
                     self._waiting[key] = self._evaluate(key, urgency)
 
-    def _evaluate(self, key: Key, urgency: int) -> Task:
+    def _evaluate(self, key: Key, urgency: int) -> EvaluationTask:
         def done(answer: Mapping[str, Any]) -> None:
             self._session.later(lambda: self._arrived(key, answer))
 
-        return self._session.evaluator.put(Task(key.do, key.file, key.text, done, dict(key.more), urgency=urgency))
+        return self._session.evaluator.put(
+            EvaluationTask(key.do, key.file, key.text, done, dict(key.more), urgency=urgency)
+        )
 
     def _arrived(self, key: Key, answer: Mapping[str, Any]) -> None:
         if self._waiting.pop(key, None) is None:

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from potto_lsp.session import Session
+    from potto_lsp.session import ClientSession
 
 SHORT = 2  # lines that are a message
 INFO = 3
@@ -25,7 +25,7 @@ INFO = 3
 class Presenter:
     """Messages and documents for a client."""
 
-    def __init__(self, session: Session) -> None:
+    def __init__(self, session: ClientSession) -> None:
         self._session = session
         self._folder: str | None = None
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from potto.quick import quick, value
 from potto_lsp import convert, protocol
-from potto_lsp.text import Text
+from potto_lsp.text import DocumentText
 from potto_lsp.uris import to_uri
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ class Report:
     """
 
     found: tuple[tuple[Located, ...], tuple[Located, ...]]
-    text: Text
+    text: DocumentText
     levels: Mapping[str, str]
     items: list[protocol.Diagnostic]
     id: str
@@ -172,7 +172,7 @@ class Publisher:
         from potto.projects.project import problems_of
 
         for project in projects:
-            text = Text(project.text, self._analysis.encoding)
+            text = DocumentText(project.text, self._analysis.encoding)
             items = convert.diagnostics(self._analysis, self._client, problems_of(project), project.path, text)
             if items or project.folder in self._wrong_projects:
                 self._publish(to_uri(project.path), items, None)

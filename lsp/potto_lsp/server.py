@@ -17,7 +17,7 @@ from typing import Any
 
 from potto_lsp import errors
 from potto_lsp.asking import Ask, about, uri_of
-from potto_lsp.carrier import Carrier, settle
+from potto_lsp.carrier import StreamServer, settle
 from potto_lsp.client import Client
 from potto_lsp.crashes import Crashes, Version
 from potto_lsp.deferred import Deferred
@@ -26,7 +26,7 @@ from potto_lsp.errors import RequestError
 from potto_lsp.features import FEATURES, Feature
 from potto_lsp.greeting import answer
 from potto_lsp.notifications import NOTIFICATIONS, Handler
-from potto_lsp.session import Reply, Session
+from potto_lsp.session import ClientSession, Reply
 from potto_lsp.wire import Outbox
 from potto_lsp.work import Job, Worker
 
@@ -39,7 +39,7 @@ def leave() -> None:
     os._exit(70)
 
 
-class Server(Carrier):
+class Server(StreamServer):
     """One client: the messages that it sends, and where answers go.
 
     `greeted`: the first message was a greeting, and has been answered.
@@ -50,7 +50,7 @@ class Server(Carrier):
         self._messages, self._outbox, self._greeted = messages, outbox, greeted
         self.protocol.set_writer(outbox)
         self.documents = Documents()
-        self.session: Session | None = None
+        self.session: ClientSession | None = None
         self.worker: Worker | None = None
         self._shut_down = False
         self._ids, self._edits = itertools.count(1), 0
@@ -97,7 +97,7 @@ class Server(Carrier):
         greeting = answer(params)
         client = Client(params)
         self.documents.encoding = client.encoding
-        self.session = Session(client, self.notify, self.request, self.later)
+        self.session = ClientSession(client, self.notify, self.request, self.later)
         self.worker = Worker(self.session.load, self.session.idle, leave)
         self.worker.start()
         if client.process is not None:

@@ -1,6 +1,6 @@
 """What a session knows once its client has introduced itself.
 
-Owns `Session`: the client, the analysis, the publisher, the evaluation process and the way back to the client.
+Owns `ClientSession`: the client, the analysis, the publisher, the evaluation process and the way back to the client.
 Everything but `notify` and `request` belongs to the thread that owns the database.
 """
 
@@ -14,7 +14,7 @@ from potto_lsp import memory
 from potto_lsp.client import Client
 from potto_lsp.features import FEATURES
 from potto_lsp.presenting import Presenter
-from potto_lsp.progress import Progress
+from potto_lsp.progress import WorkProgress
 
 if TYPE_CHECKING:
     from potto.query import Database
@@ -29,7 +29,7 @@ TREES = 50  # checked files after which the trees of closed ones are forgotten
 Reply = Callable[[Any, Any], None]  # the client's answer and its error; one of them is None
 
 
-class Session:
+class ClientSession:
     """One client and what is known of its programs."""
 
     analysis: Analysis
@@ -52,7 +52,7 @@ class Session:
         self.to_prepare: set[str] = set()  # files that were opened
         self._unknown_lints: list[str] = []
         self.to_keep: set[str] = set()  # saved files whose diagnostics are to be kept for later sessions
-        self._progress = Progress(self, "Potto: checking the workspace")
+        self._progress = WorkProgress(self, "Potto: checking the workspace")
 
     def load(self) -> Database:
         """Load what the work needs. Runs on the thread that will own the database, after the greeting."""

@@ -1,9 +1,9 @@
 """The text of an open document, its lines, and positions in it as editors count them.
 
-Owns `Text`, which is immutable: an edit gives a new one, so whoever holds a text keeps it whole. Lines end at LF, CRLF
-or a lone CR and at nothing else. Offsets count code points; columns count units of the negotiated encoding. A position
-past the end of its line means the end of that line, one past the last line the end of the text, and one inside of a
-code point its start.
+Owns `DocumentText`, which is immutable: an edit gives a new one, so whoever holds a text keeps it whole. Lines end at
+LF, CRLF or a lone CR and at nothing else. Offsets count code points; columns count units of the negotiated encoding. A
+position past the end of its line means the end of that line, one past the last line the end of the text, and one inside
+of a code point its start.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ def line_starts(text: str) -> list[int]:
     return starts
 
 
-class Lines(Struct, frozen=True):
+class LineStarts(Struct, frozen=True):
     """Where the lines of a text start, in blocks: an edit makes one or two new blocks and moves the others.
 
     offsets: where each block starts; numbers: the number of its first line; blocks: the starts of its lines, relative
@@ -56,7 +56,7 @@ class Lines(Struct, frozen=True):
         block = bisect_right(self.offsets, offset) - 1
         return self.numbers[block] + bisect_right(self.blocks[block], offset - self.offsets[block]) - 1
 
-    def replaced(self, text: str, start: int, end: int, shift: int) -> Lines:
+    def replaced(self, text: str, start: int, end: int, shift: int) -> LineStarts:
         """The lines of `text`, which differs from the text before between two offsets; everything after has moved by
         `shift`."""
         # A CR or LF at the border may join or leave the line end before it: begin one line above.
@@ -73,12 +73,12 @@ class Lines(Struct, frozen=True):
         offsets += [offset + shift for offset in self.offsets[last:]]
         all_blocks = [*self.blocks[:first], *fresh, *self.blocks[last:]]
         *numbers, count = accumulate(map(len, all_blocks), initial=0)
-        return Lines(offsets, numbers, all_blocks, count)
+        return LineStarts(offsets, numbers, all_blocks, count)
 
 
-def lines_of(text: str) -> Lines:
+def lines_of(text: str) -> LineStarts:
     """The lines of a text."""
-    return Lines([0], [0], [[0]], 1).replaced(text, 0, 0, len(text))
+    return LineStarts([0], [0], [[0]], 1).replaced(text, 0, 0, len(text))
 
 
 def units(text: str, encoding: Encoding) -> int:
@@ -102,14 +102,14 @@ def code_points(line: str, column: int, encoding: Encoding) -> int:
     return len(line)
 
 
-class Text(Struct, frozen=True, dict=True):
+class DocumentText(Struct, frozen=True, dict=True):
     """A text with its lines."""
 
     text: str
     encoding: Encoding = "utf-16"
 
     @cached_property
-    def lines(self) -> Lines:
+    def lines(self) -> LineStarts:
         return lines_of(self.text)
 
     def line(self, number: int) -> str:
@@ -152,10 +152,10 @@ class Text(Struct, frozen=True, dict=True):
         longer = (units(self.text[at], self.encoding) - 1 for at in wide)
         return wide, list(accumulate(longer, initial=0))
 
-    def replaced(self, start: int, end: int, inserted: str) -> Text:
+    def replaced(self, start: int, end: int, inserted: str) -> DocumentText:
         """The text with something else between two offsets. Only the lines nearby are scanned again."""
         start, end = min(start, end), max(start, end)
         text = self.text[:start] + inserted + self.text[end:]
-        new = Text(text, self.encoding)
+        new = DocumentText(text, self.encoding)
         new.__dict__["lines"] = self.lines.replaced(text, start, end, len(inserted) - (end - start))
         return new

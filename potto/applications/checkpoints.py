@@ -10,7 +10,7 @@ import json
 import os
 from collections.abc import Callable, Mapping
 
-from potto.applications.minimizing import Step
+from potto.applications.minimizing import Iterate
 from potto.kernels.errors import wrong_call
 
 
@@ -31,10 +31,10 @@ def kept(path: str, start: Mapping[str, float]) -> dict[str, float]:
     return {name: numbers[name] for name in start}
 
 
-def keeping(path: str, names: tuple[str, ...], told: Callable[[Step], None] | None) -> Callable[[Step], None]:
+def keeping(path: str, names: tuple[str, ...], told: Callable[[Iterate], None] | None) -> Callable[[Iterate], None]:
     """Who is told of steps writes them to the file, and tells the other."""
 
-    def step(step: Step) -> None:
+    def step(step: Iterate) -> None:
         found = {"parameters": dict(zip(names, step.parameters, strict=True)), "value": step.value,
                  "step": step.number, "evaluations": step.evaluations}  # fmt: skip
         with open(path + ".part", "w", encoding="utf-8") as stream:

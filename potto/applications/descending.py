@@ -1,6 +1,6 @@
 """Other ways down than L-BFGS: Gauss-Newton for squared distances, Adam for what is noisy or has kinks.
 
-Both ask a `Walk` for values and tell it steps; it keeps the best place and leaves at a minimum.
+Both ask a `Minimization` for values and tell it steps; it keeps the best place and leaves at a minimum.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import numpy as np
 from potto.kernels.cells import Array
 
 if TYPE_CHECKING:
-    from potto.applications.minimizing import Walk
+    from potto.applications.minimizing import Minimization
 
 RATE = 0.2  # of Adam, in first steps: where a parameter goes at most in one step; it falls to 0 as a cosine
 MEMORY_OF_SLOPES, MEMORY_OF_SQUARES = 0.9, 0.99
@@ -21,7 +21,7 @@ DAMPING = 1e-3  # at the start, of the diagonal of the normal matrix
 MOST_DAMPING = 1e12
 
 
-def gauss_newton(walk: Walk, start: Array, unit: Array, most: int) -> str:
+def gauss_newton(walk: Minimization, start: Array, unit: Array, most: int) -> str:
     """Steps that a linear model of the residuals makes, damped (Levenberg and Marquardt). Why it ends."""
     damping = DAMPING
     for _ in range(most):
@@ -46,7 +46,7 @@ def gauss_newton(walk: Walk, start: Array, unit: Array, most: int) -> str:
     return f"{most} steps are done and the value still falls"
 
 
-def adam(walk: Walk, start: Array, unit: Array, most: int) -> str:
+def adam(walk: Minimization, start: Array, unit: Array, most: int) -> str:
     """Steps of Adam, each parameter in its own size, smaller and smaller. Why it ends."""
     x, mean, square = start, np.zeros_like(start), np.zeros_like(start)
     for number in range(1, most + 1):

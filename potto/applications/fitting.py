@@ -15,7 +15,7 @@ import numpy as np
 from msgspec.structs import replace
 
 from potto.applications.checkpoints import keeping, kept
-from potto.applications.minimizing import METHODS, MOST_STEPS, Fit, Seen, Step, minimized
+from potto.applications.minimizing import METHODS, MOST_STEPS, Fit, Iterate, Seen, minimized
 from potto.kernels.cells import Array
 from potto.kernels.errors import wrong_call
 from potto.python.functions import Function
@@ -36,7 +36,7 @@ def fit(
     bounds: Mapping[str, tuple[float | None, float | None]] | None = None,
     target: Any = None,
     steps: int = MOST_STEPS,
-    progress: Callable[[Step], None] | None = None,
+    progress: Callable[[Iterate], None] | None = None,
     watch: Callable[[Estimate], object] | None = None,
     method: str = METHODS[0],
     checkpoint: str | None = None,

@@ -14,7 +14,7 @@ from msgspec import Struct
 
 from potto.applications.integral_pictures import integral_svg, words
 from potto.applications.integral_views import FRAME, IntegralNumbers, IntegralView, Viewer, numbers
-from potto.checking.regions import Region, indices, regions
+from potto.checking.regions import DrawnIntegral, indices, regions
 from potto.core.terms import ZERO, Lam, Term, app, lam, tuple_, var
 from potto.diagnostics import PottoError
 from potto.elaborate import core, elaborate_expression
@@ -82,7 +82,7 @@ class IntegralScene:
         unknown = sorted(given.keys() - set(names))
         if unknown:
             raise wrong_call(f"`{name}` has no parameter `{unknown[0]}`", f"its parameters are {', '.join(names)}")
-        self._regions: dict[str, tuple[Region, ...]] = {}
+        self._regions: dict[str, tuple[DrawnIntegral, ...]] = {}
         self._viewers: dict[tuple[str, int], Viewer] = {}
         self._took: dict[tuple[str, int], float] = {}  # seconds that numbers took last
         self._told: dict[tuple[str, int], float] = {}  # when that was
@@ -139,7 +139,7 @@ class IntegralScene:
             raise wrong_call(f"`{text}` is {len(found)} numbers", f"{size} are needed here")
         return found
 
-    def regions(self, wrt: str) -> tuple[Region, ...]:
+    def regions(self, wrt: str) -> tuple[DrawnIntegral, ...]:
         """The integrals of the function, with what moves as `wrt` does."""
         if wrt not in self.parameters:
             raise wrong_call(f"`{self.name}` has no number `{wrt}` to differentiate by",

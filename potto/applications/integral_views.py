@@ -17,7 +17,7 @@ import numpy as np
 from msgspec import Struct
 
 from potto.applications.contours import zero_lines
-from potto.checking.regions import Region, RegionSurface
+from potto.checking.regions import DrawnIntegral, RegionSurface
 from potto.core.terms import ZERO, Const, Lam
 from potto.kernels.cells import Array, Cell, Value
 from potto.python.terms import TermFunction
@@ -105,7 +105,7 @@ class IntegralNumbers(Struct, frozen=True):
 
 
 def numbers(
-    region: Region, compile: Compile, given: Mapping[str, float], wrt: str, step: float | None = None,
+    region: DrawnIntegral, compile: Compile, given: Mapping[str, float], wrt: str, step: float | None = None,
     quick: bool = False,
 ) -> IntegralNumbers:  # fmt: skip
     """The integral and its derivative by `wrt`, and a difference over `step`; if it is to be quick, that only where a
@@ -137,7 +137,7 @@ class Viewer:
     """Looks at one integral. compile: makes a function of numbers and arrays of a term of the region. parts: the names
     of parts of parameters, and what the program calls these."""
 
-    def __init__(self, region: Region, compile: Compile, parts: Mapping[str, str] | None = None) -> None:
+    def __init__(self, region: DrawnIntegral, compile: Compile, parts: Mapping[str, str] | None = None) -> None:
         self.region = region
         self._written = {**{name: name.rstrip("_") for name in region.variables}, **(parts or {})}
         self._compiled = compile

@@ -1,6 +1,6 @@
 """Minimization along derivatives, of any function of a row of numbers: knows no programs.
 
-Owns `minimized`, what it is told of a place (`Seen`) and what it answers with (`Fit`, `Step`). The derivatives hold
+Owns `minimized`, what it is told of a place (`Seen`) and what it answers with (`Fit`, `Iterate`). The derivatives hold
 their boundary terms, so a quasi-Newton method (L-BFGS-B of scipy) goes to the minimum as it would for a smooth
 function; Gauss-Newton and Adam are in `descending`. Where it stops short of a minimum, the answer says why.
 """
@@ -48,7 +48,7 @@ MOST_TOLD, MOST_DRAWN = 12, 5  # parameters
 METHODS = ("lbfgs", "gauss-newton", "adam")
 
 Objective = Callable[[Array], "Seen"]
-Way = Callable[["Walk", Array, Array, int], str]
+Way = Callable[["Minimization", Array, Array, int], str]
 """From a walk, where it starts, how far a first step goes, and how many steps there may be, to why it ended."""
 
 
@@ -67,7 +67,7 @@ class Seen(Struct, frozen=True):
     slopes: Array | None = None
 
 
-class Step(Struct, frozen=True):
+class Iterate(Struct, frozen=True):
     """How far a minimization has come: the parameters, the value there, its steepest slope, evaluations so far."""
 
     number: int
@@ -93,7 +93,7 @@ class Fit(Struct, frozen=True):
     slope: float
     converged: bool
     reason: str
-    steps: tuple[Step, ...]
+    steps: tuple[Iterate, ...]
     evaluations: int
     seconds: float
     error: float = 0.0
@@ -162,7 +162,7 @@ class Done(Exception):
     """A minimum was reached, or there is nowhere to go."""
 
 
-class Walk:
+class Minimization:
     """A minimization under way: what was seen, the best place, and the steps.
 
     A place without a value (an error of the program, nan, infinity) is answered with a wall: a parabola around the best
@@ -171,13 +171,13 @@ class Walk:
 
     def __init__(
         self, objective: Objective, names: tuple[str, ...], limits: Sequence[tuple[float, float]],
-        progress: Callable[[Step], None] | None,
+        progress: Callable[[Iterate], None] | None,
     ) -> None:  # fmt: skip
         self.objective, self.names, self.progress = objective, names, progress
         self.low, self.high = (np.array(side, dtype=float) for side in zip(*limits, strict=True))
         self.begun = time.perf_counter()
         self.evaluations = self.walls = 0
-        self.steps: list[Step] = []
+        self.steps: list[Iterate] = []
         self.size = 0.0  # of the values met
         self.best: tuple[Array, Seen] | None = None
         self.trouble: PottoError | None = None
@@ -255,7 +255,7 @@ class Walk:
         assert self.best is not None
         x, seen = self.best
         slope, seconds = self.slope(x, seen), time.perf_counter() - self.begun
-        self.steps.append(Step(len(self.steps), seen.value, tuple(map(float, x)), slope, self.evaluations, seconds))
+        self.steps.append(Iterate(len(self.steps), seen.value, tuple(map(float, x)), slope, self.evaluations, seconds))
         if self.progress is not None:
             self.progress(self.steps[-1])
         if slope <= SLOPE * max(abs(seen.value), self.size):
@@ -277,7 +277,7 @@ def minimized(
     start: Mapping[str, float],
     limits: Sequence[tuple[float, float]],
     most: int = MOST_STEPS,
-    progress: Callable[[Step], None] | None = None,
+    progress: Callable[[Iterate], None] | None = None,
     method: str = METHODS[0],
 ) -> Fit:
     """Follow the gradient of `objective` from `start` to a minimum within `limits`.
@@ -285,7 +285,7 @@ def minimized(
     Raises what the objective raises at the start.
     """
     names = tuple(start)
-    walk = Walk(objective, names, limits, progress)
+    walk = Minimization(objective, names, limits, progress)
     x0 = np.clip(np.array([float(v) for v in start.values()]), walk.low, walk.high)
     unit = FIRST * np.maximum(np.abs(x0), 0.1)  # the method's first step is at most one of these
 
@@ -306,7 +306,7 @@ def minimized(
                walk.evaluations, time.perf_counter() - walk.begun, seen.value_error, held, parameters)  # fmt: skip
 
 
-def _lbfgs(walk: Walk, x0: Array, unit: Array, most: int) -> str:
+def _lbfgs(walk: Minimization, x0: Array, unit: Array, most: int) -> str:
     """A quasi-Newton method, in units of first steps. Why it ends."""
     from scipy.optimize import minimize
 
@@ -327,7 +327,7 @@ def _lbfgs(walk: Walk, x0: Array, unit: Array, most: int) -> str:
     return reason
 
 
-def _creep(walk: Walk, newton: Callable[[Array], Array]) -> None:
+def _creep(walk: Minimization, newton: Callable[[Array], Array]) -> None:
     """Go on by the slopes: near a minimum they have all their digits, where the values have half of theirs.
 
     newton: the step for a slope, by the curvature that the method has learned.
@@ -340,7 +340,7 @@ def _creep(walk: Walk, newton: Callable[[Array], Array]) -> None:
         walk.step()
 
 
-def _reason(walk: Walk) -> str:
+def _reason(walk: Minimization) -> str:
     """Why a method finds no step that makes it smaller."""
     if walk.trouble is not None:
         return f"it ends where the program has no value: {walk.trouble.diagnostics[0].message}"

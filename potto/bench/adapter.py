@@ -1,6 +1,6 @@
 """What the bench asks of a method of integration: the one protocol that ours and the peers' fit into.
 
-Owns `Adapter` and `Answer`. An adapter turns one dial, from cheap to dear; each setting is a rung of its ladder.
+Owns `Adapter` and `MethodAnswer`. An adapter turns one dial, from cheap to dear; each setting is a rung of its ladder.
 """
 
 from __future__ import annotations
@@ -11,10 +11,10 @@ from typing import Protocol
 
 from msgspec import Struct
 
-from potto.bench.problems import Problem, Quantity
+from potto.bench.problems import BenchProblem, Quantity
 
 
-class Answer(Struct, frozen=True):
+class MethodAnswer(Struct, frozen=True):
     """One answer: the number, the evaluations of the integrand, and the error that the method itself reports.
 
     `reported` is None for a method that says nothing about its error.
@@ -25,7 +25,7 @@ class Answer(Struct, frozen=True):
     reported: float | None = None
 
 
-Solve = Callable[[float, int], Answer]  # a rung of the ladder and a seed to an answer
+Solve = Callable[[float, int], MethodAnswer]  # a rung of the ladder and a seed to an answer
 
 
 class Adapter(Protocol):
@@ -47,10 +47,10 @@ class Adapter(Protocol):
     def missing(self) -> str | None:
         """What is needed and not installed; None if it can run."""
 
-    def ladder(self, problem: Problem) -> Sequence[float]:
+    def ladder(self, problem: BenchProblem) -> Sequence[float]:
         """The settings to try, from cheap to dear; none for a problem that the method does not do."""
 
-    def prepare(self, problem: Problem, quantity: Quantity) -> Solve:
+    def prepare(self, problem: BenchProblem, quantity: Quantity) -> Solve:
         """The problem made ready (compiled, parsed); this is not timed."""
 
 

@@ -14,8 +14,8 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from msgspec import Struct
 
-from potto.bench.adapter import Adapter, Answer, Solve
-from potto.bench.problems import Problem, Quantity
+from potto.bench.adapter import Adapter, MethodAnswer, Solve
+from potto.bench.problems import BenchProblem, Quantity
 
 SEEDS = 6  # for methods that draw random numbers: errors are root mean squares over these
 REPEATS = 3
@@ -45,7 +45,7 @@ class Run(Struct, frozen=True):
 
 
 def measure(
-    problems: Iterable[Problem], adapters: Sequence[Adapter], quantities: Sequence[Quantity], seconds: float,
+    problems: Iterable[BenchProblem], adapters: Sequence[Adapter], quantities: Sequence[Quantity], seconds: float,
     rungs: int | None = None,
 ) -> Iterator[Run]:  # fmt: skip
     """Runs as they are done. A ladder ends after `rungs`, or at the first answer that takes longer than `seconds`."""
@@ -56,7 +56,7 @@ def measure(
 
 
 def climb(
-    problem: Problem, quantity: Quantity, adapter: Adapter, ladder: Sequence[float], seconds: float
+    problem: BenchProblem, quantity: Quantity, adapter: Adapter, ladder: Sequence[float], seconds: float
 ) -> Iterator[Run]:
     """One method on one problem, rung by rung."""
     solve = adapter.prepare(problem, quantity)
@@ -74,9 +74,9 @@ def climb(
             return
 
 
-def timed(problem: Problem, quantity: Quantity, adapter: Adapter, solve: Solve, rung: float) -> Run:
+def timed(problem: BenchProblem, quantity: Quantity, adapter: Adapter, solve: Solve, rung: float) -> Run:
     """One rung: a few repeats, or a few seeds."""
-    answers: list[Answer] = []
+    answers: list[MethodAnswer] = []
     times: list[float] = []
     for turn in range(SEEDS if adapter.random else REPEATS):
         start = time.perf_counter()

@@ -10,8 +10,8 @@ from collections.abc import Sequence
 
 from msgspec import Struct
 
-from potto.bench.adapter import Answer, Solve
-from potto.bench.problems import Problem, Quantity
+from potto.bench.adapter import MethodAnswer, Solve
+from potto.bench.problems import BenchProblem, Quantity
 from potto.projects.settings import settings
 from potto.python.api import Workspace
 from potto.python.functions import deriv
@@ -37,25 +37,25 @@ class Ours(Struct, frozen=True):
     def missing(self) -> str | None:
         return None
 
-    def ladder(self, problem: Problem) -> Sequence[float]:
+    def ladder(self, problem: BenchProblem) -> Sequence[float]:
         if self.method == "qmc" and problem.dimensions == 1:
             return ()  # the innermost variable is integrated exactly: nothing is left to sample
         if self.random:
             return POINTS
         return TOLERANCES
 
-    def prepare(self, problem: Problem, quantity: Quantity) -> Solve:
+    def prepare(self, problem: BenchProblem, quantity: Quantity) -> Solve:
         f = Workspace().compile(problem.program).f
         derived = deriv(f)
 
-        def solve(rung: float, seed: int) -> Answer:
+        def solve(rung: float, seed: int) -> MethodAnswer:
             turned = {"samples": int(rung)} if self.dial == "samples" else {"rtol": rung}
             with settings(method=self.method, seed=seed, max_evals=MOST_EVALUATIONS, **turned):
                 if quantity == "value":
                     found = f(problem.at)
-                    return Answer(found.value, found.evals, _reported(found, found.value, found.error))
+                    return MethodAnswer(found.value, found.evals, _reported(found, found.value, found.error))
                 found = derived((problem.at, 1.0))
-                return Answer(found.tangent, found.evals, _reported(found, found.tangent, found.tangent_error))
+                return MethodAnswer(found.tangent, found.evals, _reported(found, found.tangent, found.tangent_error))
 
         return solve
 

@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from potto.bench.adapter import Answer, Solve, installed
-from potto.bench.problems import Problem, Quantity
+from potto.bench.adapter import MethodAnswer, Solve, installed
+from potto.bench.problems import BenchProblem, Quantity
 
 TOLERANCES = (1e-1, 1e-2, 1e-3, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12)
 POINTS = tuple(2.0**k for k in range(7, 21))
@@ -38,26 +38,26 @@ class Values(ABC):
     def missing(self) -> str | None:
         return None if self.package is None or installed(self.package) else self.package
 
-    def ladder(self, problem: Problem) -> Sequence[float]:
+    def ladder(self, problem: BenchProblem) -> Sequence[float]:
         return self.rungs if problem.dimensions in self.dimensions else ()
 
     @abstractmethod
-    def integrate(self, problem: Problem, at: float, rung: float, seed: int) -> Answer:
+    def integrate(self, problem: BenchProblem, at: float, rung: float, seed: int) -> MethodAnswer:
         """The integral at one value of the parameter."""
 
-    def prepare(self, problem: Problem, quantity: Quantity) -> Solve:
+    def prepare(self, problem: BenchProblem, quantity: Quantity) -> Solve:
         if quantity == "value":
             return lambda rung, seed: self._quietly(problem, problem.at, rung, seed)
 
-        def solve(rung: float, seed: int) -> Answer:
+        def solve(rung: float, seed: int) -> MethodAnswer:
             step = (1 / math.sqrt(rung) if rung > 1 else rung) ** (1 / 3) * 0.1
             above = self._quietly(problem, problem.at + step, rung, seed)
             below = self._quietly(problem, problem.at - step, rung, seed)
-            return Answer((above.value - below.value) / (2 * step), above.evaluations + below.evaluations)
+            return MethodAnswer((above.value - below.value) / (2 * step), above.evaluations + below.evaluations)
 
         return solve
 
-    def _quietly(self, problem: Problem, at: float, rung: float, seed: int) -> Answer:
+    def _quietly(self, problem: BenchProblem, at: float, rung: float, seed: int) -> MethodAnswer:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # that a tolerance was not reached shows in the error
             return self.integrate(problem, at, rung, seed)
@@ -69,12 +69,12 @@ class Quad(Values):
     name = "scipy quad"
     dimensions = range(1, 2)
 
-    def integrate(self, problem: Problem, at: float, rung: float, seed: int) -> Answer:
+    def integrate(self, problem: BenchProblem, at: float, rung: float, seed: int) -> MethodAnswer:
         from scipy.integrate import quad
 
         f = problem.function(SCALAR)
         value, error, info = quad(f, *problem.bounds[0], (at,), epsabs=0, epsrel=rung, limit=200, full_output=1)[:3]
-        return Answer(value, info["neval"], error)
+        return MethodAnswer(value, info["neval"], error)
 
 
 class Nquad(Values):
@@ -83,12 +83,12 @@ class Nquad(Values):
     name = "scipy nquad"
     dimensions = range(2, 4)
 
-    def integrate(self, problem: Problem, at: float, rung: float, seed: int) -> Answer:
+    def integrate(self, problem: BenchProblem, at: float, rung: float, seed: int) -> MethodAnswer:
         from scipy.integrate import nquad
 
         options: Any = {"epsabs": rung * 1e-2, "epsrel": rung, "limit": 50}
         value, error, info = nquad(problem.function(SCALAR), problem.bounds, (at,), opts=options, full_output=True)
-        return Answer(value, info["neval"], error)
+        return MethodAnswer(value, info["neval"], error)
 
 
 class Cubature(Values):
@@ -101,7 +101,7 @@ class Cubature(Values):
 
         return None if hasattr(scipy.integrate, "cubature") else "scipy >= 1.15"
 
-    def integrate(self, problem: Problem, at: float, rung: float, seed: int) -> Answer:
+    def integrate(self, problem: BenchProblem, at: float, rung: float, seed: int) -> MethodAnswer:
         from scipy.integrate import cubature
 
         f, count = problem.function(BATCH), 0
@@ -113,7 +113,7 @@ class Cubature(Values):
 
         lo, hi = zip(*problem.bounds, strict=True)
         found = cubature(batch, lo, hi, rule="gk15", rtol=rung, atol=0, max_subdivisions=3000)
-        return Answer(float(found.estimate), count, float(found.error))
+        return MethodAnswer(float(found.estimate), count, float(found.error))
 
 
 class QmcQuad(Values):
@@ -125,7 +125,7 @@ class QmcQuad(Values):
     dimensions = range(1, 100)
     rungs = POINTS
 
-    def integrate(self, problem: Problem, at: float, rung: float, seed: int) -> Answer:
+    def integrate(self, problem: BenchProblem, at: float, rung: float, seed: int) -> MethodAnswer:
         from scipy.integrate import qmc_quad
         from scipy.stats.qmc import Halton
 
@@ -134,7 +134,7 @@ class QmcQuad(Values):
         engine, points = Halton(problem.dimensions, seed=seed), max(int(rung) // 8, 2)
         found = qmc_quad(lambda x: f(*np.atleast_2d(x.T).T, at) + np.zeros(np.shape(x)[1:]), lo, hi, n_estimates=8,
                          n_points=points, qrng=engine)  # fmt: skip
-        return Answer(float(found.integral), 8 * points, float(found.standard_error))
+        return MethodAnswer(float(found.integral), 8 * points, float(found.standard_error))
 
 
 class Vegas(Values):
@@ -147,7 +147,7 @@ class Vegas(Values):
     dimensions = range(1, 100)
     rungs = POINTS[3:]
 
-    def integrate(self, problem: Problem, at: float, rung: float, seed: int) -> Answer:
+    def integrate(self, problem: BenchProblem, at: float, rung: float, seed: int) -> MethodAnswer:
         import gvar
         import vegas
 
@@ -163,7 +163,7 @@ class Vegas(Values):
         integrator, share = vegas.Integrator([list(b) for b in problem.bounds], mpi=False), int(rung) // 10
         integrator(batch, nitn=5, neval=share)
         found = integrator(batch, nitn=5, neval=share)
-        return Answer(float(found.mean), count, float(found.sdev))
+        return MethodAnswer(float(found.mean), count, float(found.sdev))
 
 
 class Sum:
@@ -180,18 +180,18 @@ class Sum:
     def missing(self) -> str | None:
         return None
 
-    def ladder(self, problem: Problem) -> Sequence[float]:
+    def ladder(self, problem: BenchProblem) -> Sequence[float]:
         return SUMS if problem.dimensions <= 3 else ()
 
-    def prepare(self, problem: Problem, quantity: Quantity) -> Solve:
+    def prepare(self, problem: BenchProblem, quantity: Quantity) -> Solve:
         f = problem.function(BATCH)
 
-        def solve(rung: float, seed: int) -> Answer:
+        def solve(rung: float, seed: int) -> MethodAnswer:
             places, count = cells(problem, rung)
             if quantity == "value":
-                return Answer(float(np.mean(f(*places, problem.at))) * problem.volume, count)
+                return MethodAnswer(float(np.mean(f(*places, problem.at))) * problem.volume, count)
             moved = f(*places, complex(problem.at, 1e-30)) + np.zeros(1)
-            return Answer(float(np.mean(moved.imag)) / 1e-30 * problem.volume, count)
+            return MethodAnswer(float(np.mean(moved.imag)) / 1e-30 * problem.volume, count)
 
         return solve
 
@@ -207,10 +207,10 @@ class Jax:
     def missing(self) -> str | None:
         return None if installed("jax") else "jax"
 
-    def ladder(self, problem: Problem) -> Sequence[float]:
+    def ladder(self, problem: BenchProblem) -> Sequence[float]:
         return SUMS if problem.dimensions <= 3 else ()
 
-    def prepare(self, problem: Problem, quantity: Quantity) -> Solve:
+    def prepare(self, problem: BenchProblem, quantity: Quantity) -> Solve:
         import jax
         import jax.numpy as jnp
 
@@ -231,14 +231,14 @@ class Jax:
             device = tuple(map(jnp.asarray, places))
             known[rung] = device, count, compiled.lower(problem.at, device).compile()
 
-        def solve(rung: float, seed: int) -> Answer:
+        def solve(rung: float, seed: int) -> MethodAnswer:
             places, count, run = known[rung]
-            return Answer(float(run(problem.at, places)), count)
+            return MethodAnswer(float(run(problem.at, places)), count)
 
         return solve
 
 
-def cells(problem: Problem, points: float) -> tuple[tuple[Any, ...], int]:
+def cells(problem: BenchProblem, points: float) -> tuple[tuple[Any, ...], int]:
     """The middles of about so many equal cells of the box, as arrays that broadcast against each other."""
     n, d = max(round(points ** (1 / problem.dimensions)), 2), problem.dimensions
     axes = [lo + (hi - lo) * (np.arange(n) + 0.5) / n for lo, hi in problem.bounds]

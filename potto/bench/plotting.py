@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from potto.bench.measure import Run
-from potto.bench.problems import Problem, Quantity
+from potto.bench.problems import BenchProblem, Quantity
 
 LEAST = 1e-17  # where an error of zero is drawn
 PAIRS = 2  # of panels in a row
@@ -26,7 +26,7 @@ def has_matplotlib() -> bool:
     return find_spec("matplotlib") is not None
 
 
-def save(problems: Sequence[Problem], quantity: Quantity, runs: Sequence[Run], path: str) -> None:
+def save(problems: Sequence[BenchProblem], quantity: Quantity, runs: Sequence[Run], path: str) -> None:
     """Draw one quantity of some problems into a file; its ending says the format. Raises OSError, ValueError."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -49,7 +49,7 @@ def save(problems: Sequence[Problem], quantity: Quantity, runs: Sequence[Run], p
 
 
 def _panel(
-    axes: Any, problem: Problem, quantity: Quantity, runs: Sequence[Run], methods: Sequence[str], counted: bool,
+    axes: Any, problem: BenchProblem, quantity: Quantity, runs: Sequence[Run], methods: Sequence[str], counted: bool,
     handles: dict[str, Any],
 ) -> None:  # fmt: skip
     for index, method in enumerate(methods):

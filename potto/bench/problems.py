@@ -1,7 +1,7 @@
 """The problems of the bench: integrals that jump, with answers to 30 digits.
 
-Owns `Problem` and `catalogue`. A problem is given twice, as a Potto program and in Python's notation for peers that
-know no Potto; its answers come from closed forms, never from a program of ours.
+Owns `BenchProblem` and `catalogue`. A problem is given twice, as a Potto program and in Python's notation for peers
+that know no Potto; its answers come from closed forms, never from a program of ours.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ Quantity = Literal["value", "derivative"]
 QUANTITIES: tuple[Quantity, ...] = ("value", "derivative")
 
 
-class Problem(Struct, frozen=True, dict=True):
+class BenchProblem(Struct, frozen=True, dict=True):
     """An integral over a box, as a function of one parameter.
 
     program: defines `f`. integrand: in Python's notation, over the variables and the parameter; `H(u)` is [u >= 0].
@@ -65,15 +65,15 @@ class Problem(Struct, frozen=True, dict=True):
         return eval(self._code, {"__builtins__": {}, **names})  # our own file, not a user's text
 
 
-def catalogue() -> tuple[Problem, ...]:
+def catalogue() -> tuple[BenchProblem, ...]:
     """All problems, in the order of the report."""
     text = files("potto.bench").joinpath("catalogue.json").read_text(encoding="utf-8")
     return tuple(_problem(case) for case in json.loads(text)["cases"])
 
 
-def _problem(case: Mapping[str, Any]) -> Problem:
+def _problem(case: Mapping[str, Any]) -> BenchProblem:
     spec, wrt = case["spec"], case["wrt"]
-    return Problem(
+    return BenchProblem(
         id=case["id"],
         title=case["math"],
         why=case["why"],

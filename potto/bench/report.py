@@ -18,7 +18,7 @@ from msgspec.structs import asdict
 
 from potto.bench.adapter import Adapter, installed
 from potto.bench.measure import Run, slope
-from potto.bench.problems import QUANTITIES, Problem, Quantity, catalogue
+from potto.bench.problems import QUANTITIES, BenchProblem, Quantity, catalogue
 from potto.runtime.answers.printing import format_error
 
 Measure = Literal["time", "evaluations"]
@@ -47,7 +47,7 @@ def header(adapters: Iterable[Adapter]) -> str:
     return "\n".join(lines)
 
 
-def table(problem: Problem, quantity: Quantity, runs: Sequence[Run], measure: Measure = "time") -> str:
+def table(problem: BenchProblem, quantity: Quantity, runs: Sequence[Run], measure: Measure = "time") -> str:
     """One problem as a table: per method what it needs for each accuracy, its best error, and what it says of that."""
     here = [run for run in runs if run.problem == problem.id and run.quantity == quantity]
     what = "milliseconds" if measure == "time" else "evaluations"

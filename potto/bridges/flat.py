@@ -22,7 +22,7 @@ from potto.python.functions import Function, component, must_be_function
 from potto.python.gradients import value_and_jacobian
 from potto.python.named_parameters import Names, parameters_to_vary
 from potto.types import format_type
-from potto.types.types import ArrayOf, Dist, Parameter, Real, TupleOf, Type, Var, groups_of, resolve, result_of
+from potto.types.types import ArrayOf, Dist, Parameter, Real, TupleOf, Type, TypeVariable, groups_of, resolve, result_of
 
 Shapes = tuple[tuple[int, ...], ...]
 Stack = Callable[[Sequence[Any]], Any]
@@ -178,14 +178,16 @@ def _named(parameter: Parameter, function: Function) -> Parameter:
 def _leaves(name: str, fields: tuple[str, ...], type: Type) -> Iterator[Leaf]:
     """The arrays that a parameter is made of. Raises PottoError for one that no array can be."""
     found = resolve(type)
-    if isinstance(found, Real | Dist | Var):
+    if isinstance(found, Real | Dist | TypeVariable):
         yield Leaf(name, fields, 0)
         return
     if isinstance(found, TupleOf) and found.record is not None:
         for field, item in zip(found.record.fields, found.items, strict=True):
             yield from _leaves(name, (*fields, field), item)
         return
-    if isinstance(found, TupleOf) and all(isinstance(resolve(item), Real | Dist | Var) for item in found.items):
+    if isinstance(found, TupleOf) and all(
+        isinstance(resolve(item), Real | Dist | TypeVariable) for item in found.items
+    ):
         yield Leaf(name, fields, 1, len(found.items))
         return
     axes = axes_of(found) if isinstance(found, ArrayOf) else None
@@ -198,9 +200,11 @@ def _leaves(name: str, fields: tuple[str, ...], type: Type) -> Iterator[Leaf]:
 def _answers(function: Function) -> int | None:
     """How many numbers the answer is a tuple of; None of one number. Raises PottoError for anything else."""
     result = resolve(result_of(function._type))
-    if isinstance(result, Real | Dist | Var):
+    if isinstance(result, Real | Dist | TypeVariable):
         return None
-    if isinstance(result, TupleOf) and all(isinstance(resolve(item), Real | Dist | Var) for item in result.items):
+    if isinstance(result, TupleOf) and all(
+        isinstance(resolve(item), Real | Dist | TypeVariable) for item in result.items
+    ):
         return len(result.items)
     raise wrong_call(
         f"`{function.written}` gives {format_type(result)}, and a number or a tuple of numbers can be passed on",

@@ -60,7 +60,7 @@ class RegionSurface(Struct, frozen=True):
     jump: Lam | None
 
 
-class Index(Struct, frozen=True):
+class OuterIndex(Struct, frozen=True):
     """An index around an integral, and its first and last number, functions of the parameters and earlier indices."""
 
     name: str
@@ -68,7 +68,7 @@ class Index(Struct, frozen=True):
     last: Lam
 
 
-class Region(Struct, frozen=True):
+class DrawnIntegral(Struct, frozen=True):
     """An integral of a number: all terms are functions of `names`, the parameters and indices and then the variables.
 
     bounds, rates: of each variable from and to, and how fast these move. A bound may depend on the variables before it.
@@ -86,7 +86,7 @@ class Region(Struct, frozen=True):
     surfaces: tuple[RegionSurface, ...]
 
 
-def regions(db: Database, term: Term, wrt: str) -> tuple[Region, ...]:
+def regions(db: Database, term: Term, wrt: str) -> tuple[DrawnIntegral, ...]:
     """The outermost integrals of a function, in order; `wrt` is the parameter that moves. Of one that is a tuple there
     is a region for each number.
 
@@ -99,12 +99,12 @@ def regions(db: Database, term: Term, wrt: str) -> tuple[Region, ...]:
     return tuple(_region(part, names, work, wrt) for node in found for part in _numbers(node))
 
 
-def indices(db: Database, term: Term) -> tuple[Index, ...]:
+def indices(db: Database, term: Term) -> tuple[OuterIndex, ...]:
     """The indices that the integrals of a function depend on, outer ones first."""
     return _outermost(db, term)[2]
 
 
-def _outermost(db: Database, term: Term) -> tuple[tuple[str, ...], list[Integral], tuple[Index, ...]]:
+def _outermost(db: Database, term: Term) -> tuple[tuple[str, ...], list[Integral], tuple[OuterIndex, ...]]:
     """The parameters of a function, its integrals that are in no other one, and the indices that these depend on. Where
     one number of a tuple is used, the integral is of this number. Indices with the same name and range are the same."""
     params, whole = carried_out(db, term)
@@ -131,12 +131,12 @@ def _outermost(db: Database, term: Term) -> tuple[tuple[str, ...], list[Integral
     known = {*params, *around.values()}
     closed = [node for node in found if node.free <= known]
     needed = set[str]().union(*(node.free for node in closed))
-    kept: list[Index] = []
+    kept: list[OuterIndex] = []
     for (_, low, high), name in reversed(around.items()):
         if name in needed and low.free | high.free <= known:
             needed |= low.free | high.free
             before = (*params, *(n for n in around.values() if n in low.free | high.free))
-            kept.append(Index(name, lam(before, low), lam(before, high)))
+            kept.append(OuterIndex(name, lam(before, low), lam(before, high)))
     names = {*params, *(index.name for index in kept)}
     return tuple(params), [node for node in closed if node.free <= names], tuple(reversed(kept))
 
@@ -163,7 +163,7 @@ def _part(term: Term, place: int) -> Term:
     return proj(term, place)
 
 
-def _region(node: Integral, params: tuple[str, ...], work: Differentiator, wrt: str) -> Region:
+def _region(node: Integral, params: tuple[str, ...], work: Differentiator, wrt: str) -> DrawnIntegral:
     node = plainly_named(node, params)
     names = (*params, *node.variables)
 
@@ -185,7 +185,7 @@ def _region(node: Integral, params: tuple[str, ...], work: Differentiator, wrt: 
         for item in jumps(drawn.body, node.variables, lambda term: ONE)
         if not item.sums and not any(isinstance(inner, App) for inner in postorder(item.surface))
     ]
-    return Region(
+    return DrawnIntegral(
         names,
         node.variables,
         tuple((over(low), over(high)) for low, high in node.bounds),

@@ -13,7 +13,7 @@ from potto.extras import install_command
 if TYPE_CHECKING:
     from potto.bench.adapter import Adapter
     from potto.bench.measure import Run
-    from potto.bench.problems import Problem, Quantity
+    from potto.bench.problems import BenchProblem, Quantity
 
 SUMMARY = "measure speed against error, beside other integrators that are installed"
 EXAMPLE = "  potto bench eq1-quad disc --csv runs.csv --plot runs.png"
@@ -74,7 +74,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
 
 
 def _files(
-    runs: list[Run], problems: list[Problem], quantities: tuple[Quantity, ...], options: argparse.Namespace,
+    runs: list[Run], problems: list[BenchProblem], quantities: tuple[Quantity, ...], options: argparse.Namespace,
     console: Console,
 ) -> int:  # fmt: skip
     """Write the files that were asked for."""
@@ -93,7 +93,7 @@ def _files(
     return 0
 
 
-def _problems(names: list[str], console: Console) -> list[Problem] | None:
+def _problems(names: list[str], console: Console) -> list[BenchProblem] | None:
     from potto.bench.problems import catalogue
 
     known = {problem.id: problem for problem in catalogue()}
@@ -121,7 +121,7 @@ def _adapters(words: str | None, console: Console) -> list[Adapter] | None:
     return found
 
 
-def _list(problems: list[Problem], adapters: list[Adapter], options: argparse.Namespace, console: Console) -> None:
+def _list(problems: list[BenchProblem], adapters: list[Adapter], options: argparse.Namespace, console: Console) -> None:
     if options.json:
         console.answer_json({
             "problems": [{"id": p.id, "title": p.title, "why": p.why, "program": p.program, "wrt": p.parameter,

@@ -15,7 +15,7 @@ from potto.cli.console import Console
 from potto.cli.numbers import accounts, add_options, settings_of, show_stats
 
 if TYPE_CHECKING:
-    from potto.applications.minimizing import Fit, Step
+    from potto.applications.minimizing import Fit, Iterate
     from potto.evaluating.world import World
     from potto.runtime.answers.estimate import Estimate
 
@@ -162,7 +162,7 @@ class _Progress:
     def __init__(self, names: tuple[str, ...], console: Console) -> None:
         self.names, self.console, self.last = names, console, time.perf_counter()
 
-    def __call__(self, step: Step) -> None:
+    def __call__(self, step: Iterate) -> None:
         from potto.runtime.answers.printing import format_digits, format_error
 
         shown = list(zip(self.names, step.parameters, strict=True))

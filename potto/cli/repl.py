@@ -11,7 +11,7 @@ from potto.cli.console import Console, wants_color
 from potto.cli.numbers import add_options, settings_of
 
 if TYPE_CHECKING:
-    from potto_repl.paint import Look
+    from potto_repl.paint import Screen
 
 SUMMARY = "a prompt: define, evaluate and differentiate; or a script of it from a pipe"
 EXAMPLE = "  potto repl examples/paper/renderer.po\n  echo 'integral [0, 1] x d(x)' | potto repl --json"
@@ -52,10 +52,10 @@ def run(options: argparse.Namespace, console: Console) -> int:
     )  # fmt: skip
 
 
-def _look(options: argparse.Namespace, stream: TextIO) -> Look:
-    from potto_repl.paint import Look
+def _look(options: argparse.Namespace, stream: TextIO) -> Screen:
+    from potto_repl.paint import Screen
 
-    return Look(answers=False, color=wants_color(options.color, stream), unicode=_unicode(options))
+    return Screen(answers=False, color=wants_color(options.color, stream), unicode=_unicode(options))
 
 
 def _unicode(options: argparse.Namespace) -> bool:

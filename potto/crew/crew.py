@@ -13,7 +13,7 @@ from queue import Empty, SimpleQueue
 from threading import Lock, Thread
 from types import TracebackType
 
-from potto.crew.pipes import Found, Task, packed, unpacked
+from potto.crew.pipes import CheckedFile, CheckTask, packed, unpacked
 from potto.query import Database
 from potto.query.travel import Receiver
 
@@ -58,8 +58,8 @@ class Crew:
         self._db, self._roots = db, tuple(roots)
         self._left = dict.fromkeys(files)  # what nobody has begun
         self._lock = Lock()
-        self._found: SimpleQueue[tuple[_Helper, Found]] = SimpleQueue()
-        self._taking: tuple[_Helper, Found] | None = None
+        self._found: SimpleQueue[tuple[_Helper, CheckedFile]] = SimpleQueue()
+        self._taking: tuple[_Helper, CheckedFile] | None = None
         self._receivers: dict[tuple[_Helper, int], Receiver] = {}
         self._helpers: list[_Helper] = []
         self.texts = texts or {}  # of open files, to be replaced when they change
@@ -172,7 +172,7 @@ class _Helper:
         self._texts = texts
         self.expected += len(files)
         try:
-            self._tasks.write(packed(Task(files, roots, (*changed, *closed))))
+            self._tasks.write(packed(CheckTask(files, roots, (*changed, *closed))))
             self._tasks.flush()
         except (OSError, ValueError):
             logger.info("a helper process has ended")

@@ -10,7 +10,7 @@ from threading import Thread
 from typing import BinaryIO
 
 from potto.checking.check import diagnostics
-from potto.crew.pipes import Found, Task, packed, unpacked
+from potto.crew.pipes import CheckedFile, CheckTask, packed, unpacked
 from potto.modules import open_files
 from potto.query import Database
 from potto.query.travel import Sender
@@ -18,7 +18,7 @@ from potto.query.travel import Sender
 
 def serve(reader: BinaryIO, writer: BinaryIO) -> None:
     """Check the files of each task and tell about one after the other."""
-    tasks: SimpleQueue[Task] = SimpleQueue()
+    tasks: SimpleQueue[CheckTask] = SimpleQueue()
     Thread(target=_read, args=(reader, tasks), name="potto-tasks", daemon=True).start()
     helper = Helper()
     while True:
@@ -29,7 +29,7 @@ def serve(reader: BinaryIO, writer: BinaryIO) -> None:
             writer.flush()
 
 
-def _read(reader: BinaryIO, tasks: SimpleQueue[Task]) -> None:
+def _read(reader: BinaryIO, tasks: SimpleQueue[CheckTask]) -> None:
     """Read tasks as they come, so that whoever gives them never waits. At the end there is nobody to tell anything."""
     while (task := unpacked(reader)) is not None:
         tasks.put(task)
@@ -44,7 +44,7 @@ class Helper:
         self._files = open_files(self._db)
         self._sender, self._round = Sender(self._db), 0
 
-    def prepare(self, task: Task) -> None:
+    def prepare(self, task: CheckTask) -> None:
         """Bring roots and texts up to date."""
         before = self._db.revision
         self._files.set_roots(task.roots)
@@ -62,10 +62,10 @@ class Helper:
     def checked(self, file: str) -> bytes:
         """What there is to say about a file, as a message."""
         try:
-            return packed(Found(file, self._round, self._sender.pack(diagnostics, file)))
+            return packed(CheckedFile(file, self._round, self._sender.pack(diagnostics, file)))
         except Exception:  # whoever asked checks the file and meets it there
             self._begin_anew()
-            return packed(Found(file, self._round, None))
+            return packed(CheckedFile(file, self._round, None))
 
 
 def main() -> None:

@@ -12,7 +12,7 @@ from potto.query.travel import Parcel
 LENGTH = 4  # bytes
 
 
-class Task(Struct, frozen=True):
+class CheckTask(Struct, frozen=True):
     """Files to check, and what has changed since the last task: roots, and texts of open files (None: closed)."""
 
     files: tuple[str, ...]
@@ -20,7 +20,7 @@ class Task(Struct, frozen=True):
     texts: tuple[tuple[str, str | None], ...]
 
 
-class Found(Struct, frozen=True):
+class CheckedFile(Struct, frozen=True):
     """What was found out about a file; no parcel if that failed. `round`: after an edit both ends begin anew."""
 
     file: str
@@ -28,7 +28,7 @@ class Found(Struct, frozen=True):
     parcel: Parcel | None
 
 
-def packed(message: Task | Found) -> bytes:
+def packed(message: CheckTask | CheckedFile) -> bytes:
     """A message as bytes. Raises what pickling raises, for what is nested too deeply."""
     body = pickle.dumps(message, pickle.HIGHEST_PROTOCOL)
     return len(body).to_bytes(LENGTH, "little") + body

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 from msgspec import Struct
 
-from potto.data.mistakes import Refused, bad_row, counted, malformed, quoted
+from potto.data.mistakes import DataRefused, bad_row, counted, malformed, quoted
 from potto.data.texts import identifiers
 from potto.data.values import DEEPEST, Array, Columns, Number, Sizes, Table
 
@@ -149,13 +149,13 @@ def _entries(content: bytes, read: Callable[[ZipFile, ZipInfo], _T]) -> Iterator
     for written, name, entry in zip(names, identifiers(names), entries):
         try:
             yield name, read(archive, entry)
-        except Refused as refused:
+        except DataRefused as refused:
             raise _within(written, refused) from None
         except (*broken, zlib.error, EOFError, RuntimeError) as error:
             raise malformed(f"the array {quoted(written)} can't be read: {_said(error)}", hint=_SAVE_MANY) from None
 
 
-def _within(name: str, refused: Refused) -> Refused:
+def _within(name: str, refused: DataRefused) -> DataRefused:
     mistake = refused.mistake
     message = f"{quoted(name)}: {mistake.message}"
     if mistake.row is not None:
@@ -219,7 +219,7 @@ def _parts(dtype: object) -> tuple[_Part, ...]:
             raise malformed(f"the array holds {_ODD['V']} whose parts have no names", hint=_SAVE)
         try:
             found.append(_Part(name, _real(kind), dimensions))
-        except Refused as refused:
+        except DataRefused as refused:
             raise _within(name, refused) from None
     return tuple(found)
 
@@ -235,7 +235,7 @@ def _real(dtype: object) -> str:
     raise malformed(f"the array holds {found}, not real numbers", found=str(dtype), hint=_SAVE)
 
 
-def _pickled() -> Refused:
+def _pickled() -> DataRefused:
     message = "the file holds Python objects (a pickle); it is not read, since reading it could run any program"
     return malformed(message, found="pickle", hint=_SAVE)
 
@@ -266,7 +266,7 @@ def _array(head: _Head, content: bytes, name: str = "") -> float | Array:
     return Array(shaped.shape, Number(), found) if shaped.shape else float(found.reshape(()))
 
 
-def _infinite(at: tuple[int, ...], found: str) -> Refused:
+def _infinite(at: tuple[int, ...], found: str) -> DataRefused:
     row, column = (*(index + 1 for index in at[:2]), None, None)[:2]
     ways = ("the number", f"row {row}", f"row {row}, column {column}")
     where = ways[len(at)] if len(at) < len(ways) else f"entry {list(at)}, counted from 0"

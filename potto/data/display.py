@@ -9,7 +9,7 @@ import struct
 import zlib
 from typing import TYPE_CHECKING
 
-from potto.data.values import Array, Number, Row, Table, Value
+from potto.data.values import Array, Number, NumberRow, Table, Value
 
 if TYPE_CHECKING:
     import numpy as np
@@ -33,14 +33,14 @@ def summary(value: Value) -> str:
         return "; ".join([*shown, *([f"and {more} more"] if more else []), *left_out])
     if not isinstance(value, Array):
         return _short(value)
-    length = value.item.length if isinstance(value.item, Row) else 1
+    length = value.item.length if isinstance(value.item, NumberRow) else 1
     lines = value.values.reshape(-1, length)
     low, high = float(lines.min()), float(lines.max())
     scale = max(abs(low), abs(high)) or 1.0  # so that no sum is too large
     lines = lines / scale
     mean = float(lines.mean()) * scale
     spread = f"from {_short(low)} to {_short(high)}, mean {_short(mean)}" if low < high else f"all {_short(low)}"
-    rows = f" of rows of {length}" if isinstance(value.item, Row) else ""
+    rows = f" of rows of {length}" if isinstance(value.item, NumberRow) else ""
     return f"[{', '.join(map(str, value.dimensions))}]{rows} {spread} {_course(lines)}"
 
 
@@ -90,7 +90,7 @@ def thumbnail(value: Value) -> bytes | None:
     """
     import numpy as np
 
-    if not isinstance(value, Array) or len(value.dimensions) != 2 or value.item not in (Number(), Row(3)):
+    if not isinstance(value, Array) or len(value.dimensions) != 2 or value.item not in (Number(), NumberRow(3)):
         return None
     light = value.values.reshape(*value.dimensions, -1)
     scale = float(np.abs(light).max()) or 1.0

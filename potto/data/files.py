@@ -15,7 +15,7 @@ from msgspec import Struct
 from potto.data import arrays, pixels
 from potto.data.lists import nested
 from potto.data.memory import Memory
-from potto.data.mistakes import NO_PACKAGE, UNKNOWN_KIND, UNREADABLE, DataMistake, Refused, quoted
+from potto.data.mistakes import NO_PACKAGE, UNKNOWN_KIND, UNREADABLE, DataMistake, DataRefused, quoted
 from potto.data.tables import separated
 from potto.data.texts import text_of
 from potto.data.values import Shape, Value, shape
@@ -120,7 +120,7 @@ def shape_of(path: Path, content: bytes) -> Shape | DataMistake:
     numpy."""
     try:
         known = _kind(path).head(content)
-    except Refused as refused:
+    except DataRefused as refused:
         return refused.mistake
     if known is not None:
         return known
@@ -136,7 +136,7 @@ def values_of(path: Path, content: bytes) -> Value | DataMistake:
         return found
     try:
         found = _kind(path).value(content)
-    except Refused as refused:
+    except DataRefused as refused:
         found = refused.mistake
     if not (isinstance(found, DataMistake) and found.code == NO_PACKAGE):  # which may have come by the next time
         MEMORY.put(key, found)
@@ -149,5 +149,5 @@ def _kind(path: Path) -> _Kind:
         what = f"files with the suffix {suffix} can't be read" if suffix else "a file without a suffix can't be read"
         known = f"known are {', '.join(SUFFIXES)}"
         hint = f"{_HINTS[suffix]}; {known}" if suffix in _HINTS else known
-        raise Refused(DataMistake(UNKNOWN_KIND, what, found=suffix, expected=", ".join(SUFFIXES), hint=hint))
+        raise DataRefused(DataMistake(UNKNOWN_KIND, what, found=suffix, expected=", ".join(SUFFIXES), hint=hint))
     return _KINDS[suffix]

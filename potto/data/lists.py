@@ -19,7 +19,7 @@ from typing import Any
 import msgspec
 from msgspec import Struct
 
-from potto.data.mistakes import MALFORMED, DataMistake, Refused, bad_row, counted, malformed, quoted
+from potto.data.mistakes import MALFORMED, DataMistake, DataRefused, bad_row, counted, malformed, quoted
 from potto.data.texts import identifiers
 from potto.data.values import DEEPEST, Array, Number, Table, Value
 
@@ -75,7 +75,7 @@ def nested(text: str) -> Value:
             raise malformed("the file holds no values", hint="JSON is a number, a list or an object") from None
         message = f"line {error.lineno} is not JSON: {error.msg[:1].lower()}{error.msg[1:]}"
         place = (error.colno - 1, error.colno)
-        raise Refused(DataMistake(MALFORMED, message, error.lineno, place=place)) from None
+        raise DataRefused(DataMistake(MALFORMED, message, error.lineno, place=place)) from None
     except RecursionError:
         raise malformed(_DEEP) from None
     return _value(_Box(text, [data]))
@@ -172,7 +172,7 @@ def _object(pairs: Sequence[tuple[str, Any]]) -> dict[str, Any]:
     return found
 
 
-def _ragged(box: _Box) -> Refused:
+def _ragged(box: _Box) -> DataRefused:
     first, *_ = lists = box.entries
     at, length = next((at, len(entry)) for at, entry in enumerate(lists) if len(entry) != len(first))
     usual = counted(len(first), "value")
@@ -180,7 +180,7 @@ def _ragged(box: _Box) -> Refused:
     return _at(box, box.place(at), message, str(length), usual, _BESIDE)
 
 
-def _odd(box: _Box) -> Refused:
+def _odd(box: _Box) -> DataRefused:
     """What is said of the first entry that is of another kind than those before it, or is no number."""
     first, kinds = box.entries[0], (float, list, dict)
     usual = next((kind for kind in kinds if isinstance(first, kind)), float)
@@ -198,7 +198,7 @@ def _odd(box: _Box) -> Refused:
     return _at(box, place, f"{what}, not a number", shown, "a number", hint)
 
 
-def _at(box: _Box, place: Path, message: str, found: str, expected: str, hint: str) -> Refused:
+def _at(box: _Box, place: Path, message: str, found: str, expected: str, hint: str) -> DataRefused:
     row = _line(box.text, place)
     names = "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in place).removeprefix(".")
     where = f"line {row}, {quoted(names)}" if names else f"line {row}"

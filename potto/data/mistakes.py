@@ -1,6 +1,6 @@
 """What can be wrong with a file of data, as values.
 
-Owns `DataMistake` and the codes. Within this package a mistake travels as the exception `Refused`; it leaves as a
+Owns `DataMistake` and the codes. Within this package a mistake travels as the exception `DataRefused`; it leaves as a
 value. Messages don't name the file: who asked knows it.
 """
 
@@ -42,7 +42,7 @@ class DataMistake(Struct, frozen=True):
     place: tuple[int, int] | None = None
 
 
-class Refused(Exception):
+class DataRefused(Exception):
     """A mistake on its way to whoever asked."""
 
     def __init__(self, mistake: DataMistake) -> None:
@@ -50,17 +50,17 @@ class Refused(Exception):
         super().__init__(mistake.message)
 
 
-def malformed(message: str, *, row: int | None = None, found: str = "", hint: str = "") -> Refused:
+def malformed(message: str, *, row: int | None = None, found: str = "", hint: str = "") -> DataRefused:
     """The file as a whole is not what its name says."""
-    return Refused(DataMistake(MALFORMED, message, row, None, found, "", hint))
+    return DataRefused(DataMistake(MALFORMED, message, row, None, found, "", hint))
 
 
 def bad_row(
     message: str, row: int | None, column: int | None, found: str, expected: str, hint: str,
     place: tuple[int, int] | None = None,
-) -> Refused:  # fmt: skip
+) -> DataRefused:  # fmt: skip
     """One place of the file is not right."""
-    return Refused(DataMistake(BAD_ROW, message, row, column, found, expected, hint, (), place))
+    return DataRefused(DataMistake(BAD_ROW, message, row, column, found, expected, hint, (), place))
 
 
 def quoted(text: str) -> str:

@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Any
 
 from msgspec import Struct
 
-from potto.data.mistakes import NO_PACKAGE, DataMistake, Refused, malformed
+from potto.data.mistakes import NO_PACKAGE, DataMistake, DataRefused, malformed
 from potto.data.scanlines import CHANNELS, deep, is_sound
-from potto.data.values import Array, Item, Number, Row, Sizes
+from potto.data.values import Array, Item, Number, NumberRow, Sizes
 from potto.extras import install_command
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ class _Head(Struct, frozen=True):
 
     @property
     def item(self) -> Item:
-        return Row(3) if self.coloured else Number()
+        return NumberRow(3) if self.coloured else Number()
 
 
 def picture_head(content: bytes) -> Sizes | None:
@@ -102,7 +102,7 @@ def _pixels(content: bytes, head: _Head) -> npt.NDArray[np.float64]:
     try:
         from PIL import Image
     except ImportError:
-        raise Refused(_without_pillow()) from None
+        raise DataRefused(_without_pillow()) from None
     try:
         with Image.open(io.BytesIO(content), formats=("PNG", "JPEG")) as image:
             plain = _converted(image, head)

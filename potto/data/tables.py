@@ -15,7 +15,7 @@ from math import isfinite
 
 from msgspec import Struct
 
-from potto.data.mistakes import Refused, bad_row, counted, malformed, quoted
+from potto.data.mistakes import DataRefused, bad_row, counted, malformed, quoted
 from potto.data.texts import identifiers
 from potto.data.values import Array, Number, Table
 
@@ -224,7 +224,7 @@ def _careful(lines: Sequence[str], layout: _Layout, texts: frozenset[int]) -> li
     return columns
 
 
-def _ragged(layout: _Layout, row: int, length: int) -> Refused:
+def _ragged(layout: _Layout, row: int, length: int) -> DataRefused:
     names = f"the header has {counted(layout.width, 'name')}"
     usual = names if layout.names else f"line {layout.origin} has {layout.width}"
     hint = "every row has one value for each column; the separator was read off the first lines"

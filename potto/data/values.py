@@ -23,13 +23,13 @@ class Number(Struct, frozen=True):
     """A real number."""
 
 
-class Row(Struct, frozen=True):
+class NumberRow(Struct, frozen=True):
     """So many real numbers, such as the red, green and blue of a colour."""
 
     length: int
 
 
-Item = Number | Row
+Item = Number | NumberRow
 
 
 class Sizes(Struct, frozen=True):

@@ -19,16 +19,16 @@ from potto.elaborate.definitions import (
     elaborate_expression,
     elaborate_statement,
 )
-from potto.elaborate.signatures import Signature, signature
+from potto.elaborate.signatures import CoreSignature, signature
 
 __all__ = [
     "BindCore",
+    "CoreSignature",
     "DiffeoCore",
     "Elaborated",
     "ForCore",
     "InverseCore",
     "ShowCore",
-    "Signature",
     "StatementCore",
     "core",
     "core_term",

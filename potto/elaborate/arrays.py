@@ -47,7 +47,7 @@ from potto.data.mistakes import DataMistake
 from potto.data.values import SEPARATOR, Columns, Shape
 from potto.elaborate.context import Elaboration, rule
 from potto.elaborate.shapes import is_vector
-from potto.elaborate.values import Scope, Value
+from potto.elaborate.values import LocalNames, Value
 from potto.modules.data import DataFile, data_file
 from potto.syntax import nodes
 from potto.types.loading import type_of
@@ -56,7 +56,7 @@ from potto.types.vectors import place_in
 
 
 @rule(nodes.Index)
-def _index(elaboration: Elaboration, node: nodes.Index, scope: Scope) -> Value:
+def _index(elaboration: Elaboration, node: nodes.Index, scope: LocalNames) -> Value:
     found = elaboration.term(node.array, scope)
     for place in node.indices:
         found = elaboration.note(index(found, elaboration.term(place, scope)), node.span)
@@ -64,7 +64,7 @@ def _index(elaboration: Elaboration, node: nodes.Index, scope: Scope) -> Value:
 
 
 @rule(nodes.Field)
-def _field(elaboration: Elaboration, node: nodes.Field, scope: Scope) -> Value:
+def _field(elaboration: Elaboration, node: nodes.Field, scope: LocalNames) -> Value:
     return field(elaboration, elaboration.term(node.value, scope), node.name)
 
 
@@ -129,12 +129,12 @@ def part_of(elaboration: Elaboration, whole: Term, place: int) -> Term:
 
 
 @rule(nodes.Text)
-def _text(elaboration: Elaboration, node: nodes.Text, scope: Scope) -> Value:
+def _text(elaboration: Elaboration, node: nodes.Text, scope: LocalNames) -> Value:
     return hole("the name of a file has no value by itself")
 
 
 @rule(nodes.With)
-def _with(elaboration: Elaboration, node: nodes.With, scope: Scope) -> Value:
+def _with(elaboration: Elaboration, node: nodes.With, scope: LocalNames) -> Value:
     whole = elaboration.term(node.record, scope)
     given = {argument.name: elaboration.term(argument.value, scope) for argument in node.arguments}
     shape = elaboration.shapes.of(whole)
@@ -168,7 +168,11 @@ Binder = Callable[[str, Term, Term, Term], Term]
 
 
 def _through(
-    elaboration: Elaboration, clauses: Sequence[nodes.Clause], scope: Scope, bind: Binder, body: Callable[[Scope], Term]
+    elaboration: Elaboration,
+    clauses: Sequence[nodes.Clause],
+    scope: LocalNames,
+    bind: Binder,
+    body: Callable[[LocalNames], Term],
 ) -> Term:
     """The body inside of the binders of clauses: `bind` makes one of an index, its range, and what is inside."""
     if not clauses:
@@ -187,8 +191,8 @@ def _through(
 
 
 @rule(nodes.Reduction)
-def _reduction(elaboration: Elaboration, node: nodes.Reduction, scope: Scope) -> Value:
-    def body(inner: Scope) -> Term:
+def _reduction(elaboration: Elaboration, node: nodes.Reduction, scope: LocalNames) -> Value:
+    def body(inner: LocalNames) -> Term:
         return elaboration.term(node.body, inner)
 
     if node.op == "sum":
@@ -244,7 +248,7 @@ _FOLDED: dict[str, Callable[[Elaboration], Binder]] = {
 
 
 @rule(nodes.Comprehension)
-def _comprehension(elaboration: Elaboration, node: nodes.Comprehension, scope: Scope) -> Value:
+def _comprehension(elaboration: Elaboration, node: nodes.Comprehension, scope: LocalNames) -> Value:
     def bind(name: str, lo: Term, hi: Term, body: Term) -> Term:
         if lo is not ZERO:
             body = substitute(body, {name: add(var(name), lo)})
@@ -254,13 +258,13 @@ def _comprehension(elaboration: Elaboration, node: nodes.Comprehension, scope: S
 
 
 @rule(nodes.Fold)
-def _fold(elaboration: Elaboration, node: nodes.Fold, scope: Scope) -> Value:
+def _fold(elaboration: Elaboration, node: nodes.Fold, scope: LocalNames) -> Value:
     start = elaboration.term(node.start, scope)
     return _stepped(elaboration, node, node.clauses, scope, start)
 
 
 def _stepped(
-    elaboration: Elaboration, node: nodes.Fold, clauses: Sequence[nodes.Clause], scope: Scope, start: Term
+    elaboration: Elaboration, node: nodes.Fold, clauses: Sequence[nodes.Clause], scope: LocalNames, start: Term
 ) -> Term:
     """The state after all steps of the clauses; those of a later clause are steps of one of an earlier."""
     if not clauses:
@@ -277,7 +281,7 @@ def _stepped(
     )  # fmt: skip
 
 
-def _with_state(node: nodes.Fold, state: Term, scope: Scope) -> Scope:
+def _with_state(node: nodes.Fold, state: Term, scope: LocalNames) -> LocalNames:
     if len(node.targets) == 1:
         return scope.bind({node.targets[0].name: state})
     return scope.bind({target.name: proj(state, place) for place, target in enumerate(node.targets)})

@@ -40,24 +40,24 @@ from potto.core.terms import integral as integral_term
 from potto.elaborate.arrays import combined, field, part_of, shaped
 from potto.elaborate.context import Elaboration, rule
 from potto.elaborate.shapes import dims_of as size_of_tuple
-from potto.elaborate.values import Scope, Value
-from potto.measures.composed import Part, parts_of, problem
+from potto.elaborate.values import LocalNames, Value
+from potto.measures.composed import Component, parts_of, problem
 from potto.syntax import nodes
 from potto.types.types import ArrayOf, TupleOf, Type, resolve
 
 
 @rule(nodes.Integral)
-def _integral(elaboration: Elaboration, node: nodes.Integral, scope: Scope) -> Value:
+def _integral(elaboration: Elaboration, node: nodes.Integral, scope: LocalNames) -> Value:
     if len(node.bounds) != len(node.variables) or not node.variables:
         return hole("this integral does not have as many bounds as variables of integration")
     names: list[str] = []
-    choices: list[tuple[Part, ...]] = []  # of each variable, what its measure is the sum of
+    choices: list[tuple[Component, ...]] = []  # of each variable, what its measure is the sum of
     for bound, variable in zip(node.bounds, node.variables):
         before = scope
         name, scope = elaboration.bind_number(variable.name, scope)
         if isinstance(bound, nodes.Interval):
             ends = elaboration.term(bound.lo, before), elaboration.term(bound.hi, before)
-            choices.append((Part(ONE, ends, (), lambda _: ONE, ()),))
+            choices.append((Component(ONE, ends, (), lambda _: ONE, ()),))
         else:
             if problem(bound.shape) is not None:
                 return hole(f"`{bound.measure}` is not a measure of {len(bound.arguments)} parameters")
@@ -121,7 +121,7 @@ def _has_parts(shape: Type) -> bool:
 
 
 def _integral_over(
-    elaboration: Elaboration, node: nodes.Integral, names: tuple[str, ...], parts: tuple[Part, ...], body: Term
+    elaboration: Elaboration, node: nodes.Integral, names: tuple[str, ...], parts: tuple[Component, ...], body: Term
 ) -> Term:
     """The body over one part of the measure of each variable: neighbours that are not whole numbers in one integral.
 
@@ -145,7 +145,7 @@ def _integral_over(
     return body
 
 
-def _together(variable: tuple[str, Part]) -> str:
+def _together(variable: tuple[str, Component]) -> str:
     """What neighbours in one integral have in common; each whole number has a sum of its own."""
     return variable[0] if variable[1].discrete else ""
 

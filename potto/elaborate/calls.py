@@ -36,38 +36,40 @@ from potto.core.terms import (
 from potto.elaborate import builtins
 from potto.elaborate.arrays import as_long_as, loaded, of_vectors, standing
 from potto.elaborate.context import Elaboration, rule
-from potto.elaborate.filling import Filling, Given, Packed, Spread, fill
+from potto.elaborate.filling import Filling, GivenArgument, Spread, TupleArgument, fill
 from potto.elaborate.lookups import image, interp
 from potto.elaborate.signatures import groups_of_term, unnamed
 from potto.elaborate.slopes import slope
-from potto.elaborate.values import Builtin, Closure, Groups, Scope, Value, counted
+from potto.elaborate.values import BuiltinValue, Groups, LocalFunction, LocalNames, Value, counted
 from potto.modules.builtins import DERIVATIVES, VECTORS
 from potto.source import Span
 from potto.syntax import nodes
 from potto.types.still import is_dual, lacks_tangents
 from potto.types.types import ArrayOf, SizeVar, Type, resolve
 
-Arguments = Sequence[Given[Value]]
+Arguments = Sequence[GivenArgument[Value]]
 
 
 @rule(nodes.Apply)
-def _apply(elaboration: Elaboration, node: nodes.Apply, scope: Scope) -> Value:
+def _apply(elaboration: Elaboration, node: nodes.Apply, scope: LocalNames) -> Value:
     only = node.arguments[0].value if len(node.arguments) == 1 else None
-    if isinstance(only, nodes.Text) and elaboration.value(node.function, scope) == Builtin("load"):
+    if isinstance(only, nodes.Text) and elaboration.value(node.function, scope) == BuiltinValue("load"):
         return loaded(elaboration, only.text)
     function = elaboration.value(node.function, scope)
-    if isinstance(function, Builtin) and function.name in DERIVATIVES and node.arguments:
+    if isinstance(function, BuiltinValue) and function.name in DERIVATIVES and node.arguments:
         return slope(elaboration, function.name, node, elaboration.value(node.arguments[0].value, scope))
-    given: list[Given[Value]] = [Given(a.name, elaboration.value(a.value, scope)) for a in node.arguments]
+    given: list[GivenArgument[Value]] = [
+        GivenArgument(a.name, elaboration.value(a.value, scope)) for a in node.arguments
+    ]
     return call(elaboration, function, given, node.span)
 
 
 def call(elaboration: Elaboration, function: Value, given: Arguments, span: Span) -> Value:
     """A function applied to one group of arguments as it is written."""
     match function:
-        case Closure():
+        case LocalFunction():
             return _call_closure(elaboration, function, given, span)
-        case Builtin(name=name):
+        case BuiltinValue(name=name):
             if any(argument.name is not None for argument in given):
                 return hole(f"the parameters of `{name}` have no names")
             if name in VECTORS:
@@ -112,7 +114,7 @@ def _call_known(elaboration: Elaboration, function: Term, groups: Groups, given:
         return hole(filled)
     for group, filling in zip(groups, filled):
         args = tuple(map(elaboration.as_term, _values(elaboration, len(group), filling)))
-        if not isinstance(filling, Spread | Packed):
+        if not isinstance(filling, Spread | TupleArgument):
             args = _with_tangents(elaboration, function, _of_one_size(elaboration, function, args))
         elaboration.shapes.meets_records |= elaboration.shapes.makes_record(function)
         function = elaboration.note(app(function, args), span)
@@ -168,7 +170,7 @@ def _values(elaboration: Elaboration, count: int, filling: Filling[Value]) -> tu
             if isinstance(whole, Tuple) and len(whole.items) != count:
                 return (hole(f"{count} parameters for a tuple of {len(whole.items)}"),) * count
             return tuple(proj(whole, place) for place in range(count))
-        case Packed(values=values):
+        case TupleArgument(values=values):
             return (tuple_(map(elaboration.as_term, values)),)
         case _:
             return filling
@@ -193,7 +195,7 @@ def _is_choice(value: Value) -> bool:
 # Local functions
 
 
-def _call_closure(elaboration: Elaboration, closure: Closure, given: Arguments, span: Span) -> Value:
+def _call_closure(elaboration: Elaboration, closure: LocalFunction, given: Arguments, span: Span) -> Value:
     own = len(closure.groups)
     groups = counted(closure.groups)
     if _reaches_further(closure, given):
@@ -207,18 +209,18 @@ def _call_closure(elaboration: Elaboration, closure: Closure, given: Arguments, 
         scope = scope.bind(dict(zip(names, values)))
         arguments += values
     if len(filled) < own:
-        return Closure(closure.groups[len(filled) :], closure.bindings, closure.body, scope, closure.annotated)
+        return LocalFunction(closure.groups[len(filled) :], closure.bindings, closure.body, scope, closure.annotated)
     key = (closure, tuple(arguments))
     result = elaboration.applied.get(key)  # once for the same arguments, so that sharing is kept
     if result is None:
         result = elaboration.applied[key] = elaboration.body(closure, scope)
     for group, filling in zip(groups[own:], filled[own:]):
         values = _values(elaboration, len(group), filling)
-        result = call(elaboration, result, [Given(None, value) for value in values], span)
+        result = call(elaboration, result, [GivenArgument(None, value) for value in values], span)
     return result
 
 
-def _reaches_further(closure: Closure, given: Arguments) -> bool:
+def _reaches_further(closure: LocalFunction, given: Arguments) -> bool:
     """Whether the parameters that a local function has itself may not be all that the arguments are for."""
     names = [name for group in closure.groups for name in group]
     keywords = [argument.name for argument in given if argument.name is not None]

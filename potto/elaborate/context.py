@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 from potto.core.terms import INF, PI, Lam, Term, Tuple, app, fresh, global_, hole, lam, proj, var
 from potto.elaborate import builtins
 from potto.elaborate.shapes import Shapes
-from potto.elaborate.values import Builtin, Closure, Scope, Value, sizes
+from potto.elaborate.values import BuiltinValue, LocalFunction, LocalNames, Value, sizes
 from potto.modules.builtins import is_builtin
 from potto.modules.graph import owner
 from potto.modules.lookup import DefinitionTarget, resolve, resolve_member
@@ -25,7 +25,7 @@ MAX_DEPTH = 300  # calls of local functions within each other: deeper ones never
 MAX_CALLS = 100_000
 
 E = TypeVar("E")
-RuleOf = Callable[["Elaboration", E, Scope], Value]
+RuleOf = Callable[["Elaboration", E, LocalNames], Value]
 RULES: dict[type, RuleOf[Any]] = {}
 
 
@@ -49,24 +49,24 @@ class Elaboration:
         self.shapes = Shapes(db)
         self.origins: dict[Term, Span] = {}
         self.places: dict[Term, Span] = {}  # where conditions were written
-        self.made: dict[Closure, Term] = {}
-        self.applied: dict[tuple[Closure, tuple[Value, ...]], Value] = {}
+        self.made: dict[LocalFunction, Term] = {}
+        self.applied: dict[tuple[LocalFunction, tuple[Value, ...]], Value] = {}
         self.depth = self.calls = 0
 
     # Expressions
 
-    def value(self, expr: nodes.Expr, scope: Scope) -> Value:
+    def value(self, expr: nodes.Expr, scope: LocalNames) -> Value:
         """What an expression elaborates to."""
         return RULES[type(expr)](self, expr, scope)
 
-    def term(self, expr: nodes.Expr, scope: Scope) -> Term:
+    def term(self, expr: nodes.Expr, scope: LocalNames) -> Term:
         """The core term of an expression."""
         return self.as_term(self.value(expr, scope))
 
-    def terms(self, exprs: Iterable[nodes.Expr], scope: Scope) -> tuple[Term, ...]:
+    def terms(self, exprs: Iterable[nodes.Expr], scope: LocalNames) -> tuple[Term, ...]:
         return tuple(self.term(expr, scope) for expr in exprs)
 
-    def block(self, bindings: Sequence[nodes.Binding], scope: Scope) -> Scope:
+    def block(self, bindings: Sequence[nodes.Binding], scope: LocalNames) -> LocalNames:
         """The names of a block in scope, each line seeing those before it."""
         for binding in bindings:
             value = self.value(binding.value, scope)
@@ -83,7 +83,7 @@ class Elaboration:
 
     # Names
 
-    def name(self, name: str, scope: Scope) -> Value:
+    def name(self, name: str, scope: LocalNames) -> Value:
         """What a name stands for: a local name, else a definition, else a builtin."""
         local = scope.find(name)
         if local is not None:
@@ -92,10 +92,10 @@ class Elaboration:
         if isinstance(target, DefinitionTarget):
             return global_(target.file, target.name)
         if target is None and is_builtin(name):
-            return {"pi": PI, "inf": INF}.get(name) or Builtin(name)
+            return {"pi": PI, "inf": INF}.get(name) or BuiltinValue(name)
         return hole(f"`{name}` is not defined" if target is None else f"`{name}` is a module")
 
-    def member(self, path: str, name: str, scope: Scope) -> Value:
+    def member(self, path: str, name: str, scope: LocalNames) -> Value:
         """What `path.name` stands for; a local name hides a module."""
         head, *inner = path.split(".")
         hidden = scope.find(head) is not None
@@ -119,13 +119,13 @@ class Elaboration:
         self.taken.add(found)
         return found
 
-    def bind(self, names: Iterable[str], scope: Scope) -> tuple[tuple[str, ...], Scope]:
+    def bind(self, names: Iterable[str], scope: LocalNames) -> tuple[tuple[str, ...], LocalNames]:
         """Fresh variables for names, and the scope in which the names stand for them."""
         pairs = [(name, self.fresh(name)) for name in names]
         inner = scope.bind({name: var(new) for name, new in pairs})
         return tuple(new for _, new in pairs), inner
 
-    def bind_number(self, name: str, scope: Scope) -> tuple[str, Scope]:
+    def bind_number(self, name: str, scope: LocalNames) -> tuple[str, LocalNames]:
         """A fresh variable that stands for one number."""
         (new,), inner = self.bind((name,), scope)
         self.numbers.add(new)
@@ -136,17 +136,17 @@ class Elaboration:
     def as_term(self, value: Value) -> Term:
         """The core term of a value: functions become lambdas."""
         match value:
-            case Closure():
+            case LocalFunction():
                 found = self.made.get(value)
                 if found is None:
                     found = self.made[value] = self.function(value)
                 return found
-            case Builtin(name=name):
+            case BuiltinValue(name=name):
                 return self.builtin_lambda(name)
             case _:
                 return value
 
-    def function(self, closure: Closure, types: Sequence[Sequence[Type]] = ()) -> Term:
+    def function(self, closure: LocalFunction, types: Sequence[Sequence[Type]] = ()) -> Term:
         """A function as a term; `types` of its parameters, where they are known."""
         scope, groups = closure.scope, []
         for number, group in enumerate(closure.groups):
@@ -169,7 +169,7 @@ class Elaboration:
             term = app(term, tuple(map(var, names)))
         return lambdas(own, term)
 
-    def body(self, closure: Closure, scope: Scope) -> Value:
+    def body(self, closure: LocalFunction, scope: LocalNames) -> Value:
         """The body of a function whose parameters are in scope."""
         self.calls += 1
         if self.depth >= MAX_DEPTH or self.calls > MAX_CALLS:
@@ -177,7 +177,11 @@ class Elaboration:
         self.depth += 1
         for parameter in closure.annotated:
             value = scope.find(parameter.name)
-            if parameter.annotation is not None and value is not None and not isinstance(value, Closure | Builtin):
+            if (
+                parameter.annotation is not None
+                and value is not None
+                and not isinstance(value, LocalFunction | BuiltinValue)
+            ):
                 known = {name: size for name, size in sizes(parameter.annotation, value) if scope.find(name) is None}
                 scope = scope.bind(known)
         try:

@@ -13,7 +13,7 @@ from msgspec import Struct
 from potto.core.terms import App, Global, Term, hole, tuple_, var
 from potto.elaborate import arrays, binders, calls, expressions  # noqa: F401  (imported for their rules)
 from potto.elaborate.context import Elaboration, lambdas
-from potto.elaborate.values import EMPTY, Closure, Scope, annotated
+from potto.elaborate.values import EMPTY, LocalFunction, LocalNames, annotated
 from potto.modules.texts import definition
 from potto.query import Database, query
 from potto.source import Span
@@ -69,7 +69,7 @@ def core(db: Database, file: str, name: str) -> Elaborated:
         return _finished(elaboration, lambdas((parts.variables, *parts.groups), tuple_(parts.components)))
     groups = tuple(tuple(parameter.name for parameter in group) for group in item.groups)
     if groups:
-        closure = Closure(groups, item.bindings, item.body, EMPTY, annotated(item.groups))
+        closure = LocalFunction(groups, item.bindings, item.body, EMPTY, annotated(item.groups))
         types = [[p.type for p in group] for group in groups_of(shape(db, file, name))]
         return _finished(elaboration, elaboration.function(closure, types))
     value = elaboration.term(item.body, elaboration.block(item.bindings, EMPTY))
@@ -113,7 +113,7 @@ def elaborate_expression(
         return _finished(elaboration, elaboration.term(expr, scope))
 
 
-def _opened(db: Database, file: str, locals: Locals) -> tuple[Elaboration, Scope]:
+def _opened(db: Database, file: str, locals: Locals) -> tuple[Elaboration, LocalNames]:
     pairs = [(given, var(given)) if isinstance(given, str) else given for given in locals]
     taken = {name for _, term in pairs for name in term.free}
     return Elaboration(db, file, taken), EMPTY.bind(dict(pairs))

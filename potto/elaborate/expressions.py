@@ -27,32 +27,32 @@ from potto.elaborate.arrays import combined, negated
 from potto.elaborate.conditions import choose, compare, is_truth, logic
 from potto.elaborate.context import Elaboration, rule
 from potto.elaborate.shapes import is_vector
-from potto.elaborate.values import Closure, Scope, Value, annotated
+from potto.elaborate.values import LocalFunction, LocalNames, Value, annotated
 from potto.syntax import nodes
 
 
 @rule(nodes.Number)
-def _number(elaboration: Elaboration, node: nodes.Number, scope: Scope) -> Value:
+def _number(elaboration: Elaboration, node: nodes.Number, scope: LocalNames) -> Value:
     return const(node.value)
 
 
 @rule(nodes.ErrorExpr)
-def _error(elaboration: Elaboration, node: nodes.ErrorExpr, scope: Scope) -> Value:
+def _error(elaboration: Elaboration, node: nodes.ErrorExpr, scope: LocalNames) -> Value:
     return hole("this could not be read")
 
 
 @rule(nodes.Paren)
-def _paren(elaboration: Elaboration, node: nodes.Paren, scope: Scope) -> Value:
+def _paren(elaboration: Elaboration, node: nodes.Paren, scope: LocalNames) -> Value:
     return elaboration.value(node.inner, scope)
 
 
 @rule(nodes.Name)
-def _name(elaboration: Elaboration, node: nodes.Name, scope: Scope) -> Value:
+def _name(elaboration: Elaboration, node: nodes.Name, scope: LocalNames) -> Value:
     return elaboration.name(node.id, scope)
 
 
 @rule(nodes.Member)
-def _member(elaboration: Elaboration, node: nodes.Member, scope: Scope) -> Value:
+def _member(elaboration: Elaboration, node: nodes.Member, scope: LocalNames) -> Value:
     return elaboration.member(node.path, node.name, scope)
 
 
@@ -60,7 +60,7 @@ def _member(elaboration: Elaboration, node: nodes.Member, scope: Scope) -> Value
 
 
 @rule(nodes.Unary)
-def _unary(elaboration: Elaboration, node: nodes.Unary, scope: Scope) -> Value:
+def _unary(elaboration: Elaboration, node: nodes.Unary, scope: LocalNames) -> Value:
     operand = elaboration.term(node.operand, scope)
     match node.op:
         case "-":
@@ -72,7 +72,7 @@ def _unary(elaboration: Elaboration, node: nodes.Unary, scope: Scope) -> Value:
 
 
 @rule(nodes.Chain)
-def _chain(elaboration: Elaboration, node: nodes.Chain, scope: Scope) -> Value:
+def _chain(elaboration: Elaboration, node: nodes.Chain, scope: LocalNames) -> Value:
     first = elaboration.term(node.first, scope)
     rest = [(operand.op, elaboration.term(operand.value, scope)) for operand in node.rest]
     if any(is_vector(elaboration.shapes.of(term)) for term in (first, *(term for _, term in rest))):
@@ -93,7 +93,7 @@ def _chain(elaboration: Elaboration, node: nodes.Chain, scope: Scope) -> Value:
 
 
 @rule(nodes.Power)
-def _power(elaboration: Elaboration, node: nodes.Power, scope: Scope) -> Value:
+def _power(elaboration: Elaboration, node: nodes.Power, scope: LocalNames) -> Value:
     return pow_(elaboration.term(node.base, scope), elaboration.term(node.exponent, scope))
 
 
@@ -101,7 +101,7 @@ def _power(elaboration: Elaboration, node: nodes.Power, scope: Scope) -> Value:
 
 
 @rule(nodes.Compare)
-def _compare(elaboration: Elaboration, node: nodes.Compare, scope: Scope) -> Value:
+def _compare(elaboration: Elaboration, node: nodes.Compare, scope: LocalNames) -> Value:
     left = elaboration.term(node.first, scope)
     start, parts = node.first.span, []
     for operand in node.rest:
@@ -114,7 +114,7 @@ def _compare(elaboration: Elaboration, node: nodes.Compare, scope: Scope) -> Val
 
 
 @rule(nodes.Logic)
-def _logic(elaboration: Elaboration, node: nodes.Logic, scope: Scope) -> Value:
+def _logic(elaboration: Elaboration, node: nodes.Logic, scope: LocalNames) -> Value:
     return logic(node.op, list(elaboration.terms(node.operands, scope)))
 
 
@@ -124,7 +124,7 @@ def _placed(elaboration: Elaboration, condition: Prim, node: nodes.Expr) -> Term
 
 
 @rule(nodes.Bracket)
-def _bracket(elaboration: Elaboration, node: nodes.Bracket, scope: Scope) -> Value:
+def _bracket(elaboration: Elaboration, node: nodes.Bracket, scope: LocalNames) -> Value:
     return _iverson(elaboration, elaboration.term(node.condition, scope), node)
 
 
@@ -135,7 +135,7 @@ def _iverson(elaboration: Elaboration, condition: Term, node: nodes.Bracket | no
 
 
 @rule(nodes.If)
-def _if(elaboration: Elaboration, node: nodes.If, scope: Scope) -> Value:
+def _if(elaboration: Elaboration, node: nodes.If, scope: LocalNames) -> Value:
     condition = elaboration.term(node.condition, scope)
     then, orelse = elaboration.term(node.then, scope), elaboration.term(node.orelse, scope)
     made = choose(condition, then, orelse, False, elaboration.noting(node.condition.span))
@@ -143,7 +143,7 @@ def _if(elaboration: Elaboration, node: nodes.If, scope: Scope) -> Value:
 
 
 @rule(nodes.InlineDiffeo)
-def _inline(elaboration: Elaboration, node: nodes.InlineDiffeo, scope: Scope) -> Value:
+def _inline(elaboration: Elaboration, node: nodes.InlineDiffeo, scope: LocalNames) -> Value:
     return tuple_(elaboration.terms(node.components, scope))
 
 
@@ -151,12 +151,12 @@ def _inline(elaboration: Elaboration, node: nodes.InlineDiffeo, scope: Scope) ->
 
 
 @rule(nodes.Tuple)
-def _tuple(elaboration: Elaboration, node: nodes.Tuple, scope: Scope) -> Value:
+def _tuple(elaboration: Elaboration, node: nodes.Tuple, scope: LocalNames) -> Value:
     return tuple_(elaboration.terms(node.items, scope))
 
 
 @rule(nodes.ListLiteral)
-def _list(elaboration: Elaboration, node: nodes.ListLiteral, scope: Scope) -> Value:
+def _list(elaboration: Elaboration, node: nodes.ListLiteral, scope: LocalNames) -> Value:
     items = elaboration.terms(node.items, scope)
     if len(items) == 1 and is_truth(items[0]):  # `[p]` with a local name p for a comparison
         return _iverson(elaboration, items[0], node)
@@ -167,11 +167,11 @@ def _list(elaboration: Elaboration, node: nodes.ListLiteral, scope: Scope) -> Va
 
 
 @rule(nodes.Lambda)
-def _lambda(elaboration: Elaboration, node: nodes.Lambda, scope: Scope) -> Value:
+def _lambda(elaboration: Elaboration, node: nodes.Lambda, scope: LocalNames) -> Value:
     groups = tuple(tuple(parameter.name for parameter in group) for group in node.groups)
-    return Closure(groups, (), node.body, scope, annotated(node.groups))
+    return LocalFunction(groups, (), node.body, scope, annotated(node.groups))
 
 
 @rule(nodes.Let)
-def _let(elaboration: Elaboration, node: nodes.Let, scope: Scope) -> Value:
+def _let(elaboration: Elaboration, node: nodes.Let, scope: LocalNames) -> Value:
     return elaboration.value(node.body, elaboration.block(node.bindings, scope))

@@ -18,7 +18,7 @@ from potto.types.types import dual_name
 V = TypeVar("V")
 
 
-class Given(Struct, Generic[V], frozen=True):
+class GivenArgument(Struct, Generic[V], frozen=True):
     """One argument of a call."""
 
     name: str | None
@@ -31,16 +31,16 @@ class Spread(Struct, Generic[V], frozen=True):
     value: V
 
 
-class Packed(Struct, Generic[V], frozen=True):
+class TupleArgument(Struct, Generic[V], frozen=True):
     """Several arguments that fill one parameter, a tuple."""
 
     values: tuple[V, ...]
 
 
-Filling = tuple[V, ...] | Spread[V] | Packed[V]
+Filling = tuple[V, ...] | Spread[V] | TupleArgument[V]
 
 
-def fill(groups: Groups, given: Sequence[Given[V]], tuples: bool) -> list[Filling[V]] | str:
+def fill(groups: Groups, given: Sequence[GivenArgument[V]], tuples: bool) -> list[Filling[V]] | str:
     """What the groups get, as far as the arguments go, or why they do not fit.
 
     `tuples`: whether an only argument may be a tuple for a group of several.
@@ -52,11 +52,11 @@ def fill(groups: Groups, given: Sequence[Given[V]], tuples: bool) -> list[Fillin
         if len(given) == 1 and len(first) > 1 and tuples:
             return [Spread(given[0].value)]
         if len(groups) == len(first) == 1 and len(given) > 1 and first[0].dims in (None, len(given)):
-            return [Packed(tuple(argument.value for argument in given))]
+            return [TupleArgument(tuple(argument.value for argument in given))]
     return _placed(groups, given)
 
 
-def _placed(groups: Groups, given: Sequence[Given[V]]) -> list[Filling[V]] | str:
+def _placed(groups: Groups, given: Sequence[GivenArgument[V]]) -> list[Filling[V]] | str:
     parameters = [slot.name for group in groups for slot in group]
     taken: dict[int, V] = {}
     for argument in given:

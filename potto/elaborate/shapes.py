@@ -48,7 +48,7 @@ from potto.types.types import (
     derivative_type,
     resolve,
 )
-from potto.types.types import Var as TypeVar
+from potto.types.types import TypeVariable as TypeVar
 from potto.types.unify import as_tuple, open_type, parts, unify
 
 PLAIN = (Prim, Const)

@@ -19,7 +19,7 @@ from potto.types import interface
 from potto.types.types import Diffeo, TupleOf, Type, dual_name, groups_of, resolve, result_of
 
 
-class Signature(Struct, frozen=True):
+class CoreSignature(Struct, frozen=True):
     """The parameters of a definition, group by group; `dims` is the size of its result if that is a tuple. `record`: it
     is that of a record, which puts its arguments together. `derivative`: that of nothing but a derivative."""
 
@@ -30,7 +30,7 @@ class Signature(Struct, frozen=True):
 
 
 @query(travels=True)
-def signature(db: Database, file: str, name: str) -> Signature | None:
+def signature(db: Database, file: str, name: str) -> CoreSignature | None:
     """The signature of a definition, through aliases, imports, `deriv` and partial application; None if there is none.
 
     A value that is not a function has no groups.
@@ -44,11 +44,11 @@ def signature(db: Database, file: str, name: str) -> Signature | None:
     made = result_of(type)
     record = made.record if isinstance(made, TupleOf) else None
     named = record is not None and (record.file, record.name) == (file, name)
-    return Signature(groups or _written(item), _dims(made), named, found.derivative)
+    return CoreSignature(groups or _written(item), _dims(made), named, found.derivative)
 
 
 @query(travels=True, cuts=True)
-def unnamed(db: Database, file: str, name: str) -> Signature | None:
+def unnamed(db: Database, file: str, name: str) -> CoreSignature | None:
     """The signature without names: all that matters to a call without keywords."""
     found = signature(db, file, name)
     if found is None:

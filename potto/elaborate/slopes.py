@@ -14,7 +14,7 @@ from potto.elaborate.arrays import shaped, standing, zeros
 from potto.elaborate.builtins import parameters_of
 from potto.elaborate.conditions import choose, compare
 from potto.elaborate.context import Elaboration, lambdas
-from potto.elaborate.values import Builtin, Closure, Value
+from potto.elaborate.values import BuiltinValue, LocalFunction, Value
 from potto.modules.free import free_references
 from potto.source import Span
 from potto.syntax import nodes
@@ -59,9 +59,9 @@ def slope(elaboration: Elaboration, form: str, node: nodes.Apply, function: Valu
 def _type_of(elaboration: Elaboration, value: Value) -> Type:
     """The type of a value, also of a local function, which is looked at with what its names stand for."""
     match value:
-        case Builtin(name=name):
+        case BuiltinValue(name=name):
             return Function((Parameter(None, REAL),) * parameters_of(name), REAL)
-        case Closure():
+        case LocalFunction():
             written = _lambda_of(value)
             used = dict.fromkeys(r.id for r in free_references(written) if isinstance(r, nodes.Name))
             known = ((name, value.scope.find(name)) for name in used)
@@ -71,7 +71,7 @@ def _type_of(elaboration: Elaboration, value: Value) -> Type:
             return elaboration.shapes.named(value)
 
 
-def _lambda_of(closure: Closure) -> nodes.Expr:
+def _lambda_of(closure: LocalFunction) -> nodes.Expr:
     """A local function as it is written."""
     annotated = {parameter.name: parameter for parameter in closure.annotated}
     groups = tuple(

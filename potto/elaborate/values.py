@@ -1,7 +1,7 @@
 """What expressions elaborate to: core terms, and functions that are known so well that no term is made of them yet.
 
-Owns `Value` and `Groups`. A `Closure` is a local function: its text and the names around it, so that applying it is
-elaborating its body, with no substitution and no capture. It becomes a `Lam` only where it is passed on.
+Owns `Value` and `Groups`. A `LocalFunction` is a local function: its text and the names around it, so that applying it
+is elaborating its body, with no substitution and no capture. It becomes a `Lam` only where it is passed on.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ class Slot(Struct, frozen=True):
 Groups = tuple[tuple[Slot, ...], ...]
 
 
-class Closure(Struct, frozen=True, eq=False):
+class LocalFunction(Struct, frozen=True, eq=False):
     """A function written in the definition at hand. `scope` has the names around it and parameters already given.
 
     annotated: parameters whose types are written.
@@ -33,32 +33,32 @@ class Closure(Struct, frozen=True, eq=False):
     groups: tuple[tuple[str, ...], ...]
     bindings: tuple[nodes.Binding, ...]
     body: nodes.Expr
-    scope: Scope
+    scope: LocalNames
     annotated: tuple[nodes.Parameter, ...] = ()
 
 
-class Builtin(Struct, frozen=True):
+class BuiltinValue(Struct, frozen=True):
     """A builtin or one of the special forms, not applied."""
 
     name: str
 
 
-Value = Term | Closure | Builtin
+Value = Term | LocalFunction | BuiltinValue
 
 
-class Scope(Struct, frozen=True, eq=False):
+class LocalNames(Struct, frozen=True, eq=False):
     """The local names, with what they stand for."""
 
     names: Mapping[str, Value]
 
-    def bind(self, names: Mapping[str, Value]) -> Scope:
-        return Scope({**self.names, **names})
+    def bind(self, names: Mapping[str, Value]) -> LocalNames:
+        return LocalNames({**self.names, **names})
 
     def find(self, name: str) -> Value | None:
         return self.names.get(name)
 
 
-EMPTY = Scope({})
+EMPTY = LocalNames({})
 
 
 def annotated(groups: tuple[tuple[nodes.Parameter, ...], ...]) -> tuple[nodes.Parameter, ...]:

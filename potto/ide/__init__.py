@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 from potto.ide.model import (
     TOKEN_MODIFIERS,
     TOKEN_TYPES,
-    Call,
     CallItem,
     Change,
     CodeAction,
@@ -26,6 +25,7 @@ from potto.ide.model import (
     FileEdits,
     FileRename,
     Foldable,
+    HierarchyCall,
     Highlight,
     Hover,
     InlayHint,
@@ -58,7 +58,7 @@ if TYPE_CHECKING:
     from potto.ide.hover.hovers import hover_at
     from potto.ide.names.documents import kind_of
     from potto.ide.names.live_expressions import live_diagnostics, live_in
-    from potto.ide.names.points import Point, looked_at, point_of, points
+    from potto.ide.names.points import CallPoint, looked_at, point_of, points
     from potto.ide.names.symbols import definition_at
     from potto.ide.navigation.call_hierarchy import incoming_calls, outgoing_calls, prepare_call_hierarchy
     from potto.ide.navigation.links import document_links, linked_editing
@@ -72,8 +72,8 @@ if TYPE_CHECKING:
 __all__ = [
     "TOKEN_MODIFIERS",
     "TOKEN_TYPES",
-    "Call",
     "CallItem",
+    "CallPoint",
     "Change",
     "CodeAction",
     "CodeLens",
@@ -85,6 +85,7 @@ __all__ = [
     "FileEdits",
     "FileRename",
     "Foldable",
+    "HierarchyCall",
     "Highlight",
     "Hover",
     "InlayHint",
@@ -93,7 +94,6 @@ __all__ = [
     "Location",
     "Offer",
     "ParameterText",
-    "Point",
     "Refused",
     "Renaming",
     "Scene",
@@ -169,7 +169,7 @@ _HOMES = {
     "hover.hovers": "hover_at",
     "names.documents": "kind_of",
     "names.live_expressions": "live_diagnostics live_in",
-    "names.points": "Point looked_at point_of points",
+    "names.points": "CallPoint looked_at point_of points",
     "names.symbols": "definition_at",
     "navigation.call_hierarchy": "incoming_calls outgoing_calls prepare_call_hierarchy",
     "navigation.links": "document_links linked_editing",

@@ -178,7 +178,7 @@ class CallItem(Struct, frozen=True):
     data: tuple[str, str]
 
 
-class Call(Struct, frozen=True):
+class HierarchyCall(Struct, frozen=True):
     """Who calls or is called, and the places of the calls (in the caller's file)."""
 
     item: CallItem

@@ -11,7 +11,7 @@ import marshal
 from collections.abc import Sequence
 from typing import Any, Protocol
 
-from potto.calculus.surfaces.trace import CallSite, Layout, immediate, integrating, is_lazy, layout
+from potto.calculus.surfaces.trace import CallSite, TermSites, immediate, integrating, is_lazy, layout
 from potto.core.terms import (
     App,
     Array,
@@ -82,7 +82,7 @@ class Writer:
     def __init__(self, lam: Lam, patterns: tuple[Pattern, ...], directions: int, rounding: bool, rt: Runtime) -> None:
         self.lam, self.rt, self.directions = lam, rt, directions
         self.out = TapeLines(rounding) if rt.taping else Lines(directions, rounding, rt.side)
-        self.layout: Layout = layout(lam.body)
+        self.layout: TermSites = layout(lam.body)
         self.values: dict[Term, Known] = {}
         self.env: dict[str, Known] = {}
         self.objects: dict[str, Term | tuple[Term, ...]] = {}

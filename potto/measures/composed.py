@@ -39,7 +39,7 @@ from potto.measures.registry import MEASURES, Condition, Terms
 Tree = tuple[str, tuple["Tree | None", ...]]  # a measure and what it is given: None for a number, else a measure
 
 
-class Part(Struct, frozen=True):
+class Component(Struct, frozen=True):
     """A part of a measure over one variable: its weight, and as in `Measure` support, hints and density."""
 
     weight: Term
@@ -60,7 +60,7 @@ class Composition(Struct, frozen=True):
     name: str
     parameters: tuple[str, ...]
     takes: Callable[[tuple[Tree | None, ...]], bool]
-    parts: Callable[[Sequence[Term | tuple[Part, ...]]], tuple[Part, ...]]
+    parts: Callable[[Sequence[Term | tuple[Component, ...]]], tuple[Component, ...]]
     doc: str
     example: str
 
@@ -68,12 +68,12 @@ class Composition(Struct, frozen=True):
 COMPOSITIONS: dict[str, Composition] = {}
 
 
-def parts_of(shape: str, arguments: Sequence[Term]) -> tuple[Part, ...]:
+def parts_of(shape: str, arguments: Sequence[Term]) -> tuple[Component, ...]:
     """The parts of a measure whose shape has no `problem`."""
     return _parts(tree_of(shape), iter(arguments))
 
 
-def _parts(tree: Tree, arguments: Iterator[Term]) -> tuple[Part, ...]:
+def _parts(tree: Tree, arguments: Iterator[Term]) -> tuple[Component, ...]:
     name, inside = tree
     given = [next(arguments) if inner is None else _parts(inner, arguments) for inner in inside]
     if name in COMPOSITIONS:
@@ -81,7 +81,7 @@ def _parts(tree: Tree, arguments: Iterator[Term]) -> tuple[Part, ...]:
     measure, terms = MEASURES[name], [term for term in given if isinstance(term, Term)]
     valid = tuple((condition, f"{name}: {why}") for condition, why in measure.valid(*terms))
     support, hints = measure.support(*terms), measure.hints(*terms)
-    return (Part(ONE, support, hints, lambda x: measure.density(x, *terms), valid, measure.discrete),)
+    return (Component(ONE, support, hints, lambda x: measure.density(x, *terms), valid, measure.discrete),)
 
 
 def discrete(shape: str) -> bool:
@@ -165,7 +165,7 @@ def _bounding(tree: Tree) -> Iterator[bool]:
 # Truncated
 
 
-def _cut(part: Part, lo: Term, hi: Term) -> Part:
+def _cut(part: Component, lo: Term, hi: Term) -> Component:
     low, high = part.support
     if part.discrete:
         lo, hi = _whole("ceil", lo), _whole("floor", hi)
@@ -190,7 +190,7 @@ def _end(op: str, own: Term, other: Term, nowhere: Term) -> Term:
     return prim(op, own, other)
 
 
-def _mass(part: Part) -> Term:
+def _mass(part: Component) -> Term:
     """By the integral or the sum, not as a difference of the cdf, which has no digits in the upper tail."""
     lo, hi = part.support
     name = fresh("inside", lo.free | hi.free | part.density(ZERO).free)
@@ -199,7 +199,7 @@ def _mass(part: Part) -> Term:
     return integral((name,), (part.support,), part.density(var(name)), (part.hints,))
 
 
-def _truncated(given: Sequence[Term | tuple[Part, ...]]) -> tuple[Part, ...]:
+def _truncated(given: Sequence[Term | tuple[Component, ...]]) -> tuple[Component, ...]:
     inner, lo, hi = given
     assert isinstance(inner, tuple) and isinstance(lo, Term) and isinstance(hi, Term)
     parts = [_cut(part, lo, hi) for part in inner]
@@ -222,7 +222,7 @@ truncated = compose(
 # Mixtures
 
 
-def _mixture(given: Sequence[Term | tuple[Part, ...]]) -> tuple[Part, ...]:
+def _mixture(given: Sequence[Term | tuple[Component, ...]]) -> tuple[Component, ...]:
     weights = [term for term in given if isinstance(term, Term)]
     whole = add(*weights)
     valid = tuple((prim("le", ZERO, weight), "mixture: a weight must not be negative") for weight in weights)
@@ -254,7 +254,7 @@ mixture = compose(
 # Of numbers one by one
 
 
-def _categorical(given: Sequence[Term | tuple[Part, ...]]) -> tuple[Part, ...]:
+def _categorical(given: Sequence[Term | tuple[Component, ...]]) -> tuple[Component, ...]:
     weights = [term for term in given if isinstance(term, Term)]
     whole = add(*weights)
     valid = tuple((prim("le", ZERO, weight), "categorical: a weight must not be negative") for weight in weights)
@@ -266,7 +266,7 @@ def _categorical(given: Sequence[Term | tuple[Part, ...]]) -> tuple[Part, ...]:
             found = branch((sub(k, const(number + 0.5)),), False, found, weight)
         return div(found, whole)
 
-    return (Part(ONE, (ZERO, const(len(weights) - 1.0)), (), chance, valid, True),)
+    return (Component(ONE, (ZERO, const(len(weights) - 1.0)), (), chance, valid, True),)
 
 
 categorical = compose(

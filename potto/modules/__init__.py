@@ -29,7 +29,7 @@ from potto.modules.lookup import (
 from potto.modules.misread import syntax_diagnostics
 from potto.modules.texts import (
     ChunkRef,
-    Place,
+    DefinitionPlace,
     StatementRef,
     Unreadable,
     chunk_start,
@@ -46,10 +46,10 @@ from potto.modules.texts import (
 
 __all__ = [
     "ChunkRef",
+    "DefinitionPlace",
     "DefinitionTarget",
     "Files",
     "ModuleTarget",
-    "Place",
     "StatementRef",
     "Target",
     "Unreadable",

@@ -15,7 +15,7 @@ from potto.modules.kinds import DEFINED_TWICE, HIDES_BUILTIN, HIDES_IMPORT, UNRE
 from potto.modules.lookup import bindings
 from potto.modules.misread import shift
 from potto.modules.texts import (
-    Place,
+    DefinitionPlace,
     Unreadable,
     content,
     defined_twice,
@@ -92,5 +92,5 @@ def _imported(db: Database, file: str) -> dict[str, Span]:
     return found
 
 
-def _span(place: Place) -> Span:
+def _span(place: DefinitionPlace) -> Span:
     return place.span.shift(place.start)

@@ -31,34 +31,34 @@ Stamp = tuple[int, int, int] | None
 
 
 @value
-class Loaded:
+class ReadFile:
     """A file as it was read, and how to see that it changed since."""
 
     content: str | Unreadable | None
     stamp: Stamp
 
 
-def load(path: str) -> Loaded:
+def load(path: str) -> ReadFile:
     """Read a file. What keeps it from being a text is told as a value."""
     try:
         status = os.stat(path)
     except (FileNotFoundError, NotADirectoryError):
-        return Loaded(None, None)
+        return ReadFile(None, None)
     except (OSError, ValueError) as error:  # ValueError: a NUL in the path
-        return Loaded(Unreadable("no access", _reason(error)), None)
+        return ReadFile(Unreadable("no access", _reason(error)), None)
     stamp = (status.st_mtime_ns, status.st_size, status.st_ino)
     if stat.S_ISDIR(status.st_mode):
-        return Loaded(Unreadable("folder"), stamp)
+        return ReadFile(Unreadable("folder"), stamp)
     if not stat.S_ISREG(status.st_mode):  # reading a pipe or a device might never end
-        return Loaded(Unreadable("not a file"), stamp)
+        return ReadFile(Unreadable("not a file"), stamp)
     if status.st_size > MAX_BYTES:
-        return Loaded(Unreadable("too large", f"{status.st_size:,} bytes"), stamp)
+        return ReadFile(Unreadable("too large", f"{status.st_size:,} bytes"), stamp)
     try:
         with open(path, "rb") as file:
             data = file.read(MAX_BYTES + 1)
     except OSError as error:
-        return Loaded(Unreadable("no access", _reason(error)), stamp)
-    return Loaded(decode(data), stamp)
+        return ReadFile(Unreadable("no access", _reason(error)), stamp)
+    return ReadFile(decode(data), stamp)
 
 
 def load_data(path: str) -> tuple[DataFile | DataMistake, Stamp]:
@@ -187,7 +187,7 @@ class Files:
         wanted = self._data_stamps if keys is None else [key for key in keys if key in self._data_stamps]
         return [key for key in wanted if stamp_of(key) != self._data_stamps[key]]
 
-    def _look_again(self, key: str) -> Loaded | None:
+    def _look_again(self, key: str) -> ReadFile | None:
         """The file as it is now if it is not as it was."""
         try:
             status = os.stat(key)
@@ -244,4 +244,4 @@ def _reason(error: Exception) -> str:
     return error.strerror or str(error) if isinstance(error, OSError) else str(error)
 
 
-quick(Loaded)
+quick(ReadFile)

@@ -199,7 +199,7 @@ _STEPS: dict[type, Callable[[Any], Sequence[_Step]]] = {
     nodes.ArrayType: lambda node: (node.item,),
     nodes.FunctionType: lambda node: _annotations((node.parameters,), node.result),
     nodes.DiffeoDefinition: _diffeo_steps,
-    nodes.Inverse: lambda node: _scoped(_parameters((node.parameters,)), node.components),
+    nodes.DeclaredInverse: lambda node: _scoped(_parameters((node.parameters,)), node.components),
     nodes.Print: lambda node: node.arguments,
     nodes.ExpressionStatement: lambda node: (node.value,),
     nodes.For: lambda node: (node.iterable, *_scoped((node.variable.name,), _statements(node.body))),

@@ -24,7 +24,7 @@ from potto.modules.kinds import (
     UNUSED_IMPORT,
 )
 from potto.modules.lookup import (
-    Imported,
+    ImportBinding,
     Trail,
     bindings,
     find_module,
@@ -160,7 +160,7 @@ def _not_in_module(
     other = elsewhere(db, file, last.name)
     message = f"the module `{item.module}` has no `{imported.name}`"
     label = "not defined there"
-    if isinstance(meaning(db, last.file, last.name), Imported):
+    if isinstance(meaning(db, last.file, last.name), ImportBinding):
         message, label = (
             f"`{imported.name}` cannot be imported from the module `{item.module}`",
             "its import there fails",
@@ -177,7 +177,7 @@ def _not_in_module(
 
 def _repeated(db: Database, file: str, items: tuple[Importing, ...]) -> Iterator[Said]:
     """Names that two imports bind."""
-    seen: dict[str, Imported] = {}
+    seen: dict[str, ImportBinding] = {}
     for number, item in enumerate(items):
         for (bound, imported), span in zip(bindings(item), _spans(item)):
             before = seen.setdefault(bound, imported)

@@ -39,7 +39,7 @@ Target = DefinitionTarget | ModuleTarget
 
 
 @value
-class Imported:
+class ImportBinding:
     """What an import binds a name to: `name` of `module`, or the module itself."""
 
     module: str
@@ -47,12 +47,12 @@ class Imported:
 
 
 @value
-class Defined:
+class DefinitionBinding:
     """What a definition of the file itself binds a name to."""
 
 
 @value
-class Found:
+class FoundModule:
     """The file that a module name means, and another one that it could mean as well."""
 
     file: str
@@ -67,7 +67,7 @@ def folders(db: Database, file: str) -> tuple[str, ...]:
 
 
 @query
-def locate(db: Database, file: str, dotted: str) -> Found | None:
+def locate(db: Database, file: str, dotted: str) -> FoundModule | None:
     """The file that a module's name means in `file`, with the runner-up if `m.po` and `m.diffeo` are side by side."""
     path, itself = dotted.replace(".", "/"), None
     for folder in folders(db, file):
@@ -75,8 +75,8 @@ def locate(db: Database, file: str, dotted: str) -> Found | None:
         present = [candidate for candidate in candidates if exists(db, candidate)]
         others = [candidate for candidate in present if candidate != file]
         if others:
-            return Found(others[0], others[1] if len(others) > 1 else None)
-        itself = itself or (Found(file) if present else None)
+            return FoundModule(others[0], others[1] if len(others) > 1 else None)
+        itself = itself or (FoundModule(file) if present else None)
     return itself
 
 
@@ -88,30 +88,30 @@ def find_module(db: Database, file: str, dotted: str) -> str | None:
 
 
 @query(travels=True)
-def scope(db: Database, file: str) -> Mapping[str, Imported | Defined]:
+def scope(db: Database, file: str) -> Mapping[str, ImportBinding | DefinitionBinding]:
     """What each name (or dotted module) is bound to at the top of a file; a table, to be read by entry.
 
     A definition wins over an import of the same name, and a later import over an earlier one.
     """
-    table: dict[str, Imported | Defined] = {}
+    table: dict[str, ImportBinding | DefinitionBinding] = {}
     for item in imports(db, file):
         table.update(bindings(item))
-    table.update(dict.fromkeys(names(db, file), Defined()))
+    table.update(dict.fromkeys(names(db, file), DefinitionBinding()))
     return table
 
 
-def bindings(item: nodes.FromImport | nodes.Import) -> Iterator[tuple[str, Imported]]:
+def bindings(item: nodes.FromImport | nodes.Import) -> Iterator[tuple[str, ImportBinding]]:
     """The names that an import binds, and to what. `import pkg.m` binds `pkg.m`."""
     if not is_written(item.module):
         return
     if isinstance(item, nodes.Import):
-        yield item.alias or item.module, Imported(item.module, None)
+        yield item.alias or item.module, ImportBinding(item.module, None)
         return
     for imported in written_names(item):
-        yield imported.alias or imported.name, Imported(item.module, imported.name)
+        yield imported.alias or imported.name, ImportBinding(item.module, imported.name)
 
 
-def meaning(db: Database, file: str, name: str) -> Imported | Defined | None:
+def meaning(db: Database, file: str, name: str) -> ImportBinding | DefinitionBinding | None:
     """What a name is bound to at the top of a file, if to anything."""
     return db.entry(scope, (file,), name)
 
@@ -172,7 +172,7 @@ def trail(db: Database, file: str, name: str) -> Trail:
             bound = meaning(db, file, name)
         if bound is None:
             return Trail(None, tuple(steps))
-        if isinstance(bound, Defined):
+        if isinstance(bound, DefinitionBinding):
             return Trail(DefinitionTarget(file, name), tuple(steps))
         module, original = bound.module, bound.name
         target = find_module(db, file, module)
@@ -190,7 +190,7 @@ def trail(db: Database, file: str, name: str) -> Trail:
 def resolve(db: Database, file: str, name: str) -> Target | None:
     """What a name means at the top of a file: a definition, here or where it was imported from, or a module."""
     bound = meaning(db, file, name)
-    if isinstance(bound, Defined):
+    if isinstance(bound, DefinitionBinding):
         return DefinitionTarget(file, name)
     if bound is None and not is_entry(file):
         return None
@@ -221,4 +221,4 @@ def resolve_module(db: Database, file: str, path: str) -> str | None:
     return at
 
 
-quick(ModuleTarget, Imported, Defined, Found, Trail)
+quick(ModuleTarget, ImportBinding, DefinitionBinding, FoundModule, Trail)

@@ -58,7 +58,7 @@ class Head:
 
 
 @value
-class Place:
+class DefinitionPlace:
     """The chunk that defines a name; `span` is the name's, relative to the chunk."""
 
     start: int
@@ -73,7 +73,7 @@ class Piece:
     text: str
     chunks: tuple[ChunkRef, ...]
     texts: Mapping[str, str]
-    places: Mapping[str, tuple[Place, ...]]
+    places: Mapping[str, tuple[DefinitionPlace, ...]]
     imports: tuple[ChunkRef, ...]
     statements: tuple[ChunkRef, ...]
     definitions: int
@@ -81,7 +81,7 @@ class Piece:
 
 
 @value
-class Layout:
+class FileLayout:
     """A file in pieces, the place where each starts, and the piece that has the definition of a name which counts."""
 
     pieces: tuple[Piece, ...]
@@ -192,7 +192,7 @@ def chunk_references(db: Database, text: str, diffeo: bool) -> tuple[Reference, 
 
 
 @value
-class Outline:
+class FileOutline:
     """What of a file's layout no body edit and no move changes. `nameless`: a broken chunk might define anything."""
 
     names: tuple[str, ...]
@@ -205,7 +205,7 @@ def piece(db: Database, text: str, diffeo: bool) -> Piece:
     """What a piece of a file holds."""
     definitions, nameless = 0, False
     texts: dict[str, str] = {}
-    places: dict[str, tuple[Place, ...]] = {}
+    places: dict[str, tuple[DefinitionPlace, ...]] = {}
     imports: list[ChunkRef] = []
     statements: list[ChunkRef] = []
     found = split(text)
@@ -215,7 +215,7 @@ def piece(db: Database, text: str, diffeo: bool) -> Piece:
             name = described.name
             texts[name] = chunk.text
             definitions += 1
-            places[name] = (*places.get(name, ()), Place(chunk.start, described.name_span))
+            places[name] = (*places.get(name, ()), DefinitionPlace(chunk.start, described.name_span))
         elif described.kind == "import":
             imports.append(chunk)
         elif described.kind == "statement":
@@ -232,15 +232,15 @@ def _group(db: Database, group: tuple[str, ...], diffeo: bool) -> tuple[Piece, .
 
 
 @query
-def layout(db: Database, file: str) -> Layout:
+def layout(db: Database, file: str) -> FileLayout:
     """What is where in a file. Read the projections below instead, they stand still."""
     diffeo = is_diffeo(file)
     found = tuple([one for group in groups_of_pieces(db, file) for one in _group(db, group, diffeo)])
     starts = accumulate([len(one.text) for one in found[:-1]], initial=0) if found else ()
-    return Layout(found, tuple(starts), _place(found, db.former(layout, (file,))))
+    return FileLayout(found, tuple(starts), _place(found, db.former(layout, (file,))))
 
 
-def _place(found: tuple[Piece, ...], former: Layout | None) -> Mapping[str, int]:
+def _place(found: tuple[Piece, ...], former: FileLayout | None) -> Mapping[str, int]:
     """The piece that has the definition of each name, which most edits leave as it was."""
     if former is not None and len(former.pieces) == len(found):
         pairs = zip(found, former.pieces)
@@ -260,11 +260,11 @@ def texts(db: Database, file: str) -> Parted:
 
 
 @query(travels=True, cuts=True)
-def outline(db: Database, file: str) -> Outline:
+def outline(db: Database, file: str) -> FileOutline:
     """What a file defines and imports, without places."""
     found = layout(db, file)
     importing = tuple([chunk.text for piece in found.pieces for chunk in piece.imports])
-    return Outline(tuple(found.place), importing, any(piece.nameless for piece in found.pieces))
+    return FileOutline(tuple(found.place), importing, any(piece.nameless for piece in found.pieces))
 
 
 @query(travels=True)
@@ -287,12 +287,12 @@ def chunk_start(db: Database, file: str, name: str) -> int:
     return 0 if place is None else found.starts[place] + found.pieces[place].places[name][-1].start
 
 
-def places(db: Database, file: str, name: str) -> tuple[Place, ...]:
+def places(db: Database, file: str, name: str) -> tuple[DefinitionPlace, ...]:
     """Where a name is defined in a file, each time; absolute."""
     found = layout(db, file)
     return tuple(
         [
-            Place(start + place.start, place.span)
+            DefinitionPlace(start + place.start, place.span)
             for piece, start in zip(found.pieces, found.starts)
             for place in piece.places.get(name, ())
         ]
@@ -369,4 +369,4 @@ def import_starts(db: Database, file: str) -> tuple[int, ...]:
     return tuple([start + one.start for piece, start in zip(found.pieces, found.starts) for one in piece.imports])
 
 
-quick(Head, Place, Piece, Unreadable, StatementRef, Layout, Outline)
+quick(Head, DefinitionPlace, Piece, Unreadable, StatementRef, FileLayout, FileOutline)

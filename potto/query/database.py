@@ -13,12 +13,12 @@ from potto.query.nodes import (
     GONE,
     MISSING,
     Cancelled,
-    Event,
     Input,
     Memo,
     Node,
     Parted,
     Query,
+    QueryEvent,
     drop,
     entry_of,
     renew,
@@ -220,12 +220,12 @@ class Database(Engine):
     # Events
 
     @property
-    def events(self) -> list[Event]:
+    def events(self) -> list[QueryEvent]:
         """What the innermost `recording` has recorded so far."""
         return self._events if self._events is not None else []
 
     @contextmanager
-    def recording(self) -> Iterator[list[Event]]:
+    def recording(self) -> Iterator[list[QueryEvent]]:
         """Record events in the list that this yields."""
         before, logs, self._events, self._logs = self._events, self._logs, [], True
         try:

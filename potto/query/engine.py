@@ -22,10 +22,10 @@ from potto.query.nodes import (
     Below,
     Cancelled,
     CycleError,
-    Event,
     Memo,
     Node,
     Query,
+    QueryEvent,
     Strayed,
     drop,
     has_returned,
@@ -59,7 +59,7 @@ class Engine:
         self._running: list[Memo] = []
         self._floor = 0  # the lowest place among these that a cycle may reach
         self._provisional: list[Memo] = []  # finished members of a cycle whose first query still runs
-        self._events: list[Event] | None = None
+        self._events: list[QueryEvent] | None = None
         self._print = "query" in os.environ.get("POTTO_LOG", "").split(",")
         self._logs = self._print
 
@@ -84,7 +84,7 @@ class Engine:
 
     def _log(self, kind: Literal["executed", "reused", "input"], name: str, args: tuple[Hashable, ...]) -> None:
         if self._events is not None:
-            self._events.append(Event(kind, name, args))
+            self._events.append(QueryEvent(kind, name, args))
         if self._print:
             print(f"query: {kind} {name}({', '.join(map(short, args))})", file=sys.stderr)
 

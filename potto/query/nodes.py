@@ -28,7 +28,7 @@ class CycleError(Exception):
 
 
 @value
-class Event:
+class QueryEvent:
     """What happened to a query or input (`query` is then "input"). `reused`: verified after an edit without a run."""
 
     kind: Literal["executed", "reused", "input"]
@@ -140,7 +140,7 @@ class Memo:
         self.found: Below | None = None
         self.cuts = query.cuts
         self.verified_at, self.changed_at, self.durability = -1, -1, 0
-        self.entries: dict[Any, Entry] | None = None
+        self.entries: dict[Any, MappingEntry] | None = None
         self.former: Former | None = None
         self.again: Former | None = None
         self.before: Memo | None = None
@@ -211,7 +211,7 @@ class Memo:
             changes.add(entry)
 
 
-class Entry:
+class MappingEntry:
     """One key of a query whose value is a mapping. It changes only when the value under that key does."""
 
     __slots__ = ("again", "changed_at", "former", "key", "source", "value")
@@ -262,17 +262,17 @@ class Below:
         self.nodes, self.sources, self.noisy = frozenset(nodes), tuple(sources), frozenset(noisy)
 
 
-def entry_of(memo: Memo, key: Any) -> Entry:
+def entry_of(memo: Memo, key: Any) -> MappingEntry:
     """The entry of a memo whose value is a mapping."""
     if memo.entries is None:
         memo.entries = {}
     node = memo.entries.get(key)
     if node is None:
-        node = memo.entries[key] = Entry(memo, key)
+        node = memo.entries[key] = MappingEntry(memo, key)
     return node
 
 
-Node = Input | Memo | Entry
+Node = Input | Memo | MappingEntry
 Leaf = Node
 
 
@@ -321,4 +321,4 @@ def short(value: object) -> str:
     return text if len(text) <= 60 else f"{text[:40]}...{text[-16:]}"
 
 
-quick(Event, Parted)
+quick(QueryEvent, Parted)

@@ -17,7 +17,7 @@ from importlib import import_module
 from typing import Any
 
 from potto.query.database import Database
-from potto.query.nodes import Entry, Input, Memo, Node, Query, entry_of
+from potto.query.nodes import Input, MappingEntry, Memo, Node, Query, entry_of
 from potto.quick import quick, value
 
 Args = tuple[Hashable, ...]
@@ -94,7 +94,7 @@ class Sender:
                 below[number] = None
             elif isinstance(dep, Input):
                 below[self._input(dep)] = None
-            elif isinstance(dep, Entry) and dep.source.query.travels:
+            elif isinstance(dep, MappingEntry) and dep.source.query.travels:
                 below[self._number(dep, (self._views[dep.source][0], dep.key, None))] = None
             else:
                 for number in self._views[dep.source]:

@@ -14,10 +14,10 @@ from potto.source import Span
 from potto.syntax import kinds
 from potto.syntax.groups import (
     Context,
-    Group,
+    ListedItem,
+    Parenthesized,
     Suffixed,
     Values,
-    Written,
     as_arguments,
     as_expr,
     as_parameters,
@@ -126,35 +126,35 @@ def bracket_comma(_: Context, v: Values) -> ListLiteral:
 # Parentheses
 
 
-def arguments(_: Context, v: Values) -> list[Written]:
+def arguments(_: Context, v: Values) -> list[ListedItem]:
     return [_written(v[0], "")]
 
 
-def more_arguments(_: Context, v: Values) -> list[Written]:
+def more_arguments(_: Context, v: Values) -> list[ListedItem]:
     v[0].append(_written(v[2], v[1].text))
     return v[0]  # type: ignore[no-any-return]
 
 
-def _written(value: Any, before: str) -> Written:
-    if isinstance(value, Written):
+def _written(value: Any, before: str) -> ListedItem:
+    if isinstance(value, ListedItem):
         return value._replace(separator=before)
-    return Written(None, value, None, before)
+    return ListedItem(None, value, None, before)
 
 
-def keyword(_: Context, v: Values) -> Written:
-    return Written(v[0], v[2], None, "")
+def keyword(_: Context, v: Values) -> ListedItem:
+    return ListedItem(v[0], v[2], None, "")
 
 
-def paren_empty(_: Context, v: Values) -> Group:
-    return Group(Span(v[0].start, v[1].end), (), False, not v[0].text)
+def paren_empty(_: Context, v: Values) -> Parenthesized:
+    return Parenthesized(Span(v[0].start, v[1].end), (), False, not v[0].text)
 
 
-def paren(_: Context, v: Values) -> Group:
-    return Group(Span(v[0].start, v[2].end), tuple(v[1]), False, not v[0].text)
+def paren(_: Context, v: Values) -> Parenthesized:
+    return Parenthesized(Span(v[0].start, v[2].end), tuple(v[1]), False, not v[0].text)
 
 
-def paren_comma(_: Context, v: Values) -> Group:
-    return Group(Span(v[0].start, v[3].end), tuple(v[1]), True, not v[0].text)
+def paren_comma(_: Context, v: Values) -> Parenthesized:
+    return Parenthesized(Span(v[0].start, v[3].end), tuple(v[1]), True, not v[0].text)
 
 
 # Expressions
@@ -164,7 +164,7 @@ def application(context: Context, v: Values) -> Expr:
     function, value = as_expr(context, v[0]), v[1]
     if isinstance(value, Suffixed):
         return suffixed(application(context, [function, value.group]), value.suffixes)
-    if isinstance(value, Group):
+    if isinstance(value, Parenthesized):
         span = Span(function.span.start, value.span.end)
         return Apply(span, function, as_arguments(context, value), True)
     return Apply(Span(function.span.start, value.span.end), function, (Argument(value.span, None, None, value),), False)
@@ -272,7 +272,7 @@ def lambda_group(context: Context, v: Values) -> tuple[list[tuple[Parameter, ...
 
 
 def inline_diffeo(context: Context, v: Values) -> InlineDiffeo:
-    group: Group = v[1]
+    group: Parenthesized = v[1]
     if not group.written:
         context.report(kinds.MISSING_EXPRESSION(group.span, "a `diffeo` needs at least one coordinate"))
     components = tuple(plain(context, written) for written in group.written)

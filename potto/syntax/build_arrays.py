@@ -5,7 +5,17 @@ from __future__ import annotations
 from typing import Any
 
 from potto.source import Span
-from potto.syntax.groups import Context, Group, Suffix, Suffixed, Values, as_arguments, as_expr, as_parameters, suffixed
+from potto.syntax.groups import (
+    Context,
+    Parenthesized,
+    Suffix,
+    Suffixed,
+    Values,
+    as_arguments,
+    as_expr,
+    as_parameters,
+    suffixed,
+)
 from potto.syntax.nodes import (
     Argument,
     Binder,
@@ -32,7 +42,7 @@ def field(_: Context, v: Values) -> Any:
 
 
 def _behind(value: Any, suffix: Suffix) -> Any:
-    if isinstance(value, Group):
+    if isinstance(value, Parenthesized):
         return Suffixed(value, (suffix,))
     if isinstance(value, Suffixed):
         return Suffixed(value.group, (*value.suffixes, suffix))
@@ -72,7 +82,7 @@ def fold(context: Context, v: Values) -> Fold:
     return Fold(Span(v[0].start, v[7].span.end), targets, v[3], tuple(v[5]), body)
 
 
-def _body(context: Context, group: Group) -> Expr:
+def _body(context: Context, group: Parenthesized) -> Expr:
     body = as_expr(context, group)
     return body.inner if isinstance(body, Paren) else body
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from potto.diagnostics import Related
 from potto.source import Span
 from potto.syntax import kinds
-from potto.syntax.groups import Context, Group, Values, as_binders, plain
+from potto.syntax.groups import Context, Parenthesized, Values, as_binders, plain
 from potto.syntax.nodes import Apply, Binder, Expr, Integral, Interval, MeasureBound, Name
 
 
@@ -14,7 +14,7 @@ def interval(_: Context, v: Values) -> Interval:
 
 
 def measure(context: Context, v: Values) -> MeasureBound:
-    group: Group = v[3]
+    group: Parenthesized = v[3]
     values = tuple(plain(context, written) for written in group.written)
     span = Span(v[0].start, group.span.end)
     shape, arguments, inner = _opened(v[2].text, values)

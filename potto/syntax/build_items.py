@@ -8,12 +8,13 @@ from potto.diagnostics import suggest
 from potto.source import Span
 from potto.syntax import kinds
 from potto.syntax.build_types import as_type
-from potto.syntax.groups import Context, Group, Values, as_parameters, distinct
+from potto.syntax.groups import Context, Parenthesized, Values, as_parameters, distinct
 from potto.syntax.nodes import (
     Apply,
     Binder,
     Binding,
     BrokenItem,
+    DeclaredInverse,
     Definition,
     DiffeoDefinition,
     ErrorExpr,
@@ -23,7 +24,6 @@ from potto.syntax.nodes import (
     FromImport,
     Import,
     ImportedName,
-    Inverse,
     Item,
     Lambda,
     Let,
@@ -73,7 +73,7 @@ def definition(context: Context, v: Values) -> Item:
     return Definition(span, name.text, name.span, parameters, annotation, bindings, body, True)
 
 
-def _groups(context: Context, groups: list[Group]) -> Groups:
+def _groups(context: Context, groups: list[Parenthesized]) -> Groups:
     """The parameters of a def; a name is bound once over all its groups."""
     seen: dict[str, Span] = {}
     out: list[tuple[Parameter, ...]] = []
@@ -224,14 +224,14 @@ def _diffeo(context: Context, v: Values, bindings: tuple[Binding, ...], body: Ex
     )
 
 
-def _split_semicolon(group: Group) -> list[Group]:
+def _split_semicolon(group: Parenthesized) -> list[Parenthesized]:
     """`(x, y; c)` is two groups."""
     parts: list[list[Any]] = [[]]
     for written in group.written:
         if written.separator == ";":
             parts.append([])
         parts[-1].append(written._replace(separator=""))
-    return [Group(group.span, tuple(part), False, group.virtual) for part in parts]
+    return [Parenthesized(group.span, tuple(part), False, group.virtual) for part in parts]
 
 
 def _diffeo_equation(context: Context, left: Name, body: Expr, clauses: Values, span: Span) -> Item:
@@ -274,28 +274,28 @@ def _components(body: Expr) -> tuple[Expr, ...]:
     return (body.inner,) if isinstance(body, Paren) else (body,)
 
 
-def inverse(context: Context, v: Values) -> tuple[Span, Inverse]:
+def inverse(context: Context, v: Values) -> tuple[Span, DeclaredInverse]:
     return _inverse(context, v[0], v[1], v[3])
 
 
-def inverse_lambda(context: Context, v: Values) -> tuple[Span, Inverse]:
+def inverse_lambda(context: Context, v: Values) -> tuple[Span, DeclaredInverse]:
     return _inverse(context, v[0], v[2], v[4])
 
 
-def _inverse(context: Context, word: Token, group: Group, body: Expr) -> tuple[Span, Inverse]:
+def _inverse(context: Context, word: Token, group: Parenthesized, body: Expr) -> tuple[Span, DeclaredInverse]:
     span = Span(word.start, body.span.end)
-    return span, Inverse(span, as_parameters(context, group), _components(body))
+    return span, DeclaredInverse(span, as_parameters(context, group), _components(body))
 
 
 def where(_: Context, v: Values) -> tuple[Span, list[Expr]]:
     return Span(v[0].start, v[1][-1].span.end), v[1]
 
 
-def _clauses(context: Context, clauses: Values) -> tuple[Inverse | None, tuple[Expr, ...]]:
-    found: Inverse | None = None
+def _clauses(context: Context, clauses: Values) -> tuple[DeclaredInverse | None, tuple[Expr, ...]]:
+    found: DeclaredInverse | None = None
     conditions: list[Expr] = []
     for span, clause in clauses:
-        if not isinstance(clause, Inverse):
+        if not isinstance(clause, DeclaredInverse):
             conditions.extend(clause)
         elif found is None:
             found = clause

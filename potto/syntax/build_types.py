@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from potto.source import Span
 from potto.syntax import kinds
-from potto.syntax.groups import Context, Values, Written
+from potto.syntax.groups import Context, ListedItem, Values
 from potto.syntax.habits import ARRAY_TYPE, ARRAYS
 from potto.syntax.nodes import (
     ArrayType,
@@ -81,9 +81,9 @@ def _real(context: Context, head: Token, star: bool, variables: tuple[str, ...],
     return RealType(span, "Real", star, variables)
 
 
-def parameter(context: Context, v: Values) -> Written:
+def parameter(context: Context, v: Values) -> ListedItem:
     """`name: T` between the commas of parentheses."""
-    return Written(v[0], None, as_type(context, v[2]), "")
+    return ListedItem(v[0], None, as_type(context, v[2]), "")
 
 
 def type_unit(_: Context, v: Values) -> _Parens:

@@ -1,7 +1,7 @@
 """Parentheses, which may turn out to be an expression, a tuple, arguments, parameters or variables.
 
-Owns `Context`, `Group` and what makes of a group what its place asks for. What has no meaning there is reported and
-mended, so that a tree remains.
+Owns `Context`, `Parenthesized` and what makes of a group what its place asks for. What has no meaning there is reported
+and mended, so that a tree remains.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class Context:
         self.diagnostics.append(diagnostic)
 
 
-class Written(NamedTuple):
+class ListedItem(NamedTuple):
     """One thing between the commas of parentheses, before it is known what the parentheses are."""
 
     name: Token | None
@@ -60,11 +60,11 @@ class Written(NamedTuple):
     """What stands before it: `,`, `;` or nothing."""
 
 
-class Group(NamedTuple):
+class Parenthesized(NamedTuple):
     """Parentheses: an expression, a tuple, arguments, parameters or variables."""
 
     span: Span
-    written: tuple[Written, ...]
+    written: tuple[ListedItem, ...]
     trailing: bool
     virtual: bool
 
@@ -72,7 +72,7 @@ class Group(NamedTuple):
 class Suffixed(NamedTuple):
     """Parentheses with what stands directly behind: `(x)[i]` by itself is an index, `f(x)[i]` one of the call."""
 
-    group: Group
+    group: Parenthesized
     suffixes: tuple[Suffix, ...]
 
 
@@ -110,7 +110,7 @@ def as_expr(context: Context, value: Any) -> Expr:
     """Parentheses that stand for a value: `(e)` or a tuple; anything but parentheses as it is."""
     if isinstance(value, Suffixed):
         return suffixed(as_expr(context, value.group), value.suffixes)
-    if not isinstance(value, Group):
+    if not isinstance(value, Parenthesized):
         return value  # type: ignore[no-any-return]
     items = list[Expr]()
     for written in value.written:
@@ -125,7 +125,7 @@ def as_expr(context: Context, value: Any) -> Expr:
     return Tuple(value.span, tuple(items))
 
 
-def plain(context: Context, written: Written, before: Expr | None = None) -> Expr:
+def plain(context: Context, written: ListedItem, before: Expr | None = None) -> Expr:
     """A thing between commas where only an expression has a meaning. before: the one before it, if that matters."""
     if written.separator == ";":
         _semicolon(context, written)
@@ -150,7 +150,7 @@ def plain(context: Context, written: Written, before: Expr | None = None) -> Exp
     return Compare(span, target, (op,))
 
 
-def _semicolon(context: Context, written: Written) -> None:
+def _semicolon(context: Context, written: ListedItem) -> None:
     value = written.name if written.name is not None else written.value
     at = context.text.rfind(";", 0, value.span.start)
     near = not context.text[at + 1 : value.span.start].strip()  # else a comment lies between
@@ -164,7 +164,7 @@ def _semicolon(context: Context, written: Written) -> None:
     )
 
 
-def as_arguments(context: Context, group: Group) -> tuple[Argument, ...]:
+def as_arguments(context: Context, group: Parenthesized) -> tuple[Argument, ...]:
     """Parentheses that hold the arguments of a call."""
     out: list[Argument] = []
     seen: dict[str, Span] = {}
@@ -211,7 +211,7 @@ def as_parameters(context: Context, value: Any, what: str = "parameter") -> tupl
     return tuple(out)
 
 
-def _not_a_name(context: Context, written: Written, what: str) -> None:
+def _not_a_name(context: Context, written: ListedItem, what: str) -> None:
     if written.name is not None:
         span = written.name.span.cover(written.value.span)
         context.report(
@@ -228,7 +228,7 @@ def _not_a_name(context: Context, written: Written, what: str) -> None:
     context.report(kinds.NOT_A_NAME(span, message, help=help))
 
 
-def as_binders(context: Context, group: Group, what: str) -> tuple[Binder, ...]:
+def as_binders(context: Context, group: Parenthesized, what: str) -> tuple[Binder, ...]:
     """The variables in parentheses, without types."""
     out: list[Binder] = []
     for found in as_parameters(context, group, what):

@@ -114,7 +114,7 @@ class RecordDefinition:
 
 
 @value
-class Inverse:
+class DeclaredInverse:
     """`inverse (u, v) . (x, y)`: the author's inverse of a diffeomorphism."""
 
     span: Span
@@ -138,7 +138,7 @@ class DiffeoDefinition:
     groups: tuple[tuple[Parameter, ...], ...]
     bindings: tuple[Binding, ...]
     components: tuple[Expr, ...]
-    inverse: Inverse | None
+    inverse: DeclaredInverse | None
     where: tuple[Expr, ...]
     keyword: bool
 
@@ -196,7 +196,7 @@ Part = (
     | Clause
     | Interval
     | MeasureBound
-    | Inverse
+    | DeclaredInverse
     | ImportedName
 )
 Node = Expr | TypeExpr | Item | Part

@@ -20,7 +20,7 @@ STARTS = ("chunk", "expression")
 FILE = Path(__file__).with_name("tables.json")
 
 
-class Rule(Struct, frozen=True):
+class Production(Struct, frozen=True):
     """A reduction: `size` symbols become one `origin`; `action` names what builds its value, None passes it on."""
 
     origin: str
@@ -31,7 +31,7 @@ class Rule(Struct, frozen=True):
 class Tables(Struct, frozen=True):
     """`rows[state][symbol]` is a state to go to (>= 0) or `~rule` to reduce by (< 0)."""
 
-    rules: tuple[Rule, ...]
+    rules: tuple[Production, ...]
     rows: tuple[dict[str, int], ...]
     starts: dict[str, int]
     ends: dict[str, int]
@@ -53,7 +53,9 @@ def written() -> Tables | None:
     data = json.loads(FILE.read_text(encoding="utf-8"))
     if data["grammar"] != _digest(grammar_text()):
         return None
-    return Tables(tuple([Rule(*rule) for rule in data["rules"]]), tuple(data["rows"]), data["starts"], data["ends"])
+    return Tables(
+        tuple([Production(*rule) for rule in data["rules"]]), tuple(data["rows"]), data["starts"], data["ends"]
+    )
 
 
 def write() -> None:
@@ -77,12 +79,12 @@ def compute(grammar: str) -> Tables:
     for state, actions in table.states.items():
         for symbol, (action, target) in actions.items():
             rows[state][str(symbol)] = target if action.name == "Shift" else ~rules.setdefault(target, len(rules))
-    known = tuple(Rule(str(rule.origin.name), len(rule.expansion), _action(rule)) for rule in rules)
+    known = tuple(Production(str(rule.origin.name), len(rule.expansion), _action(rule)) for rule in rules)
     _skip_units(rows, known)
     return Tables(known, tuple(rows), dict(table.start_states), dict(table.end_states))
 
 
-def _skip_units(rows: list[dict[str, int]], rules: tuple[Rule, ...]) -> None:
+def _skip_units(rows: list[dict[str, int]], rules: tuple[Production, ...]) -> None:
     """Go at once to where a state leads that does nothing but pass a value on, whatever comes next."""
     passes: dict[int, str] = {}
     for state, row in enumerate(rows):

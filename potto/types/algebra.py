@@ -15,8 +15,9 @@ from potto.types.values import (
     NONE,
     STILL,
     Abstract,
+    AbstractFunction,
+    AbstractScalar,
     Choice,
-    Closure,
     Effect,
     Joined,
     ListValue,
@@ -25,7 +26,6 @@ from potto.types.values import (
     PortFunction,
     PortTree,
     PortTuple,
-    Scalar,
     Source,
     Sources,
     Step,
@@ -73,9 +73,9 @@ def fitted(value: Value, type: Type) -> Value:
     """
     type = resolve(type)
     match type, value:
-        case Function(group, result), Closure(inputs, answer, effects) if len(group) == len(inputs):
+        case Function(group, result), AbstractFunction(inputs, answer, effects) if len(group) == len(inputs):
             simple = (Effect(effect.to, _simple(effect.value)) for effect in effects)
-            return Closure(inputs, fitted(answer, result), tuple(simple))
+            return AbstractFunction(inputs, fitted(answer, result), tuple(simple))
         case TupleOf(items), TupleValue(parts) if len(items) == len(parts):
             return TupleValue(tuple(map(fitted, parts, items)))
         case ArrayOf(_, item), ListValue(inner):
@@ -87,7 +87,7 @@ def fitted(value: Value, type: Type) -> Value:
 
 
 def _simple(value: Value) -> Value:
-    return value if isinstance(value, Scalar) else Scalar(flat(value))
+    return value if isinstance(value, AbstractScalar) else AbstractScalar(flat(value))
 
 
 def noted(value: Value, step: Step) -> Value:
@@ -99,15 +99,15 @@ def taint(value: Value, sources: Sources, jumps: frozenset[Surface] = frozenset(
     """A value that also varies with `sources` and jumps across `jumps`."""
     if not sources and not jumps:
         return value
-    if isinstance(value, Scalar):
-        return Scalar(merge(value.sources, sources), value.jumps | jumps, value.spikes, value.carriers)
+    if isinstance(value, AbstractScalar):
+        return AbstractScalar(merge(value.sources, sources), value.jumps | jumps, value.spikes, value.carriers)
     match value:
         case TupleValue(items):
             return TupleValue(tuple(taint(item, sources, jumps) for item in items))
         case ListValue(item):
             return ListValue(taint(item, sources, jumps))
-        case Closure(inputs, result, effects):
-            return Closure(inputs, taint(result, sources, jumps), effects)
+        case AbstractFunction(inputs, result, effects):
+            return AbstractFunction(inputs, taint(result, sources, jumps), effects)
         case Abstract(ports, result, tainted):
             return Abstract(ports, result, merge(tainted, sources))
         case Choice(options):
@@ -115,17 +115,17 @@ def taint(value: Value, sources: Sources, jumps: frozenset[Surface] = frozenset(
 
 
 def _each(value: Value, change: Callable[[Sources], Sources]) -> Value:
-    if isinstance(value, Scalar):
+    if isinstance(value, AbstractScalar):
         if not value.sources:
             return value
-        return Scalar(change(value.sources), value.jumps, value.spikes, value.carriers)
+        return AbstractScalar(change(value.sources), value.jumps, value.spikes, value.carriers)
     match value:
         case TupleValue(items):
             return TupleValue(tuple(_each(item, change) for item in items))
         case ListValue(item):
             return ListValue(_each(item, change))
-        case Closure(inputs, result, effects):
-            return Closure(inputs, _each(result, change), effects)
+        case AbstractFunction(inputs, result, effects):
+            return AbstractFunction(inputs, _each(result, change), effects)
         case Abstract(ports, result, tainted):
             return Abstract(ports, _each(result, change), change(tainted))
         case Choice(options):
@@ -134,7 +134,7 @@ def _each(value: Value, change: Callable[[Sources], Sources]) -> Value:
 
 def without(value: Value, variables: frozenset[Source]) -> Value:
     """A value after integration over `variables`: they are gone, and so are the surfaces and deltas across them."""
-    if isinstance(value, Scalar):
+    if isinstance(value, AbstractScalar):
         if not value.sources:
             return value
         left = {source: trail for source, trail in value.sources.items() if source not in variables}
@@ -143,7 +143,7 @@ def without(value: Value, variables: frozenset[Source]) -> Value:
             jumps = frozenset(surface for surface in jumps if not surface & variables)
         if spikes:
             spikes = frozenset(spike for spike in spikes if not spike.over & variables)
-        return Scalar(left, jumps, spikes, value.carriers)
+        return AbstractScalar(left, jumps, spikes, value.carriers)
     match value:
         case TupleValue(items):
             return TupleValue(tuple(without(item, variables) for item in items))
@@ -155,7 +155,7 @@ def without(value: Value, variables: frozenset[Source]) -> Value:
 
 def flat(value: Value) -> Sources:
     """All that a value varies with; of a function, whatever it is called with."""
-    if isinstance(value, Scalar):  # nearly always, and a `match` takes five times as long to see it
+    if isinstance(value, AbstractScalar):  # nearly always, and a `match` takes five times as long to see it
         return value.sources
     match value:
         case TupleValue(items) | Choice(items):
@@ -165,7 +165,7 @@ def flat(value: Value) -> Sources:
             return found
         case ListValue(item):
             return flat(item)
-        case Closure(inputs, result):
+        case AbstractFunction(inputs, result):
             own = set(inputs_of(inputs))
             return {source: trail for source, trail in flat(result).items() if source not in own}
         case Abstract(_, result, tainted):
@@ -173,29 +173,29 @@ def flat(value: Value) -> Sources:
 
 
 def jumps_of(value: Value) -> frozenset[Surface]:
-    return value.jumps if isinstance(value, Scalar) else frozenset()
+    return value.jumps if isinstance(value, AbstractScalar) else frozenset()
 
 
 def join(a: Value, b: Value) -> Value:
     """Either of two values."""
     if a is b:
         return a
-    if isinstance(a, Scalar) and isinstance(b, Scalar):
+    if isinstance(a, AbstractScalar) and isinstance(b, AbstractScalar):
         sources = merge(a.sources, b.sources)
-        return Scalar(sources, a.jumps | b.jumps, a.spikes | b.spikes, a.carriers | b.carriers)
+        return AbstractScalar(sources, a.jumps | b.jumps, a.spikes | b.spikes, a.carriers | b.carriers)
     match a, b:
         case TupleValue(), TupleValue() if len(a.items) == len(b.items):
             return TupleValue(tuple(join(x, y) for x, y in zip(a.items, b.items)))
         case ListValue(), ListValue():
             return ListValue(join(a.item, b.item))
-        case Scalar(), TupleValue() | ListValue():
+        case AbstractScalar(), TupleValue() | ListValue():
             return taint(b, a.sources, a.jumps)
-        case TupleValue() | ListValue(), Scalar():
+        case TupleValue() | ListValue(), AbstractScalar():
             return taint(a, b.sources, b.jumps)
-        case (Closure() | Abstract() | Choice(), _) | (_, Closure() | Abstract() | Choice()):
+        case (AbstractFunction() | Abstract() | Choice(), _) | (_, AbstractFunction() | Abstract() | Choice()):
             return Choice((*_options(a), *_options(b)))
         case _:
-            return Scalar(merge(flat(a), flat(b)))
+            return AbstractScalar(merge(flat(a), flat(b)))
 
 
 def _options(value: Value) -> tuple[Value, ...]:
@@ -216,22 +216,22 @@ def symbolic(type: Type, source: Callable[[], Source], port: Callable[[], Port])
     """The input of a type, with a source of its own at each number, and ports where it is a function."""
     type = resolve(type)
     if isinstance(type, RealType):
-        return Scalar({source(): None})
+        return AbstractScalar({source(): None})
     match type:
         case DistType() | TruthType():
-            return Scalar({source(): None})
+            return AbstractScalar({source(): None})
         case TupleOf(items):
             return TupleValue(tuple(symbolic(item, source, port) for item in items))
         case ArrayOf(_, item):
             return ListValue(symbolic(item, source, port))
         case Diffeo(dims) if dims is not None:
-            return TupleValue(tuple(Scalar({source(): None}) for _ in range(dims)))
+            return TupleValue(tuple(AbstractScalar({source(): None}) for _ in range(dims)))
         case Function(group, result):
             ports = tuple(ports_of(p.type, source, port) for p in group)
             return Abstract(ports, symbolic(result, source, port))
         case _:
             own = source()
-            return Scalar({own: None}, carriers=frozenset((own,)))
+            return AbstractScalar({own: None}, carriers=frozenset((own,)))
 
 
 def ports_of(type: Type, source: Callable[[], Source], port: Callable[[], Port]) -> PortTree:
@@ -251,7 +251,7 @@ def inputs_of(values: Iterable[Value]) -> list[Source]:
     """The sources of symbolic inputs, in order."""
     found: list[Source] = []
     for value in values:
-        if isinstance(value, Scalar):
+        if isinstance(value, AbstractScalar):
             found += value.sources
             continue
         match value:
@@ -263,7 +263,7 @@ def inputs_of(values: Iterable[Value]) -> list[Source]:
                 for port in ports:
                     found += inputs_of_ports(port)
                 found += inputs_of((result,))
-            case Closure():
+            case AbstractFunction():
                 pass
     return found
 
@@ -283,7 +283,7 @@ def ports_in(values: Iterable[Value]) -> list[Port]:
     """The ports of symbolic inputs, in order."""
     found: list[Port] = []
     for value in values:
-        if isinstance(value, Scalar):
+        if isinstance(value, AbstractScalar):
             continue
         match value:
             case TupleValue(items) | Choice(items):

@@ -1,8 +1,8 @@
 """Everything about one definition, or about several that need each other: types, then dependence, then the interface.
 
-Owns `Analysis`. Pure functions of trees and of what the definitions around provide (`Outside`); the queries are in
-`queries`. Recursive definitions have one type each while they are inferred; their flows start from nothing and are
-walked again until they stand still (they only grow, and there are finitely many).
+Owns `DefinitionAnalysis`. Pure functions of trees and of what the definitions around provide (`Outside`); the queries
+are in `queries`. Recursive definitions have one type each while they are inferred; their flows start from nothing and
+are walked again until they stand still (they only grow, and there are finitely many).
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from potto.types import (  # noqa: F401  (imported for their rules)
 from potto.types.algebra import fitted, flat, symbolic
 from potto.types.annotations import written_type
 from potto.types.closing import declared, reasons_of
-from potto.types.context import Inference, Part, ensure_stack
+from potto.types.context import Inference, NamedPart, ensure_stack
 from potto.types.flow import Walk
 from potto.types.infer import bindings, returned
 from potto.types.interfaces import Closing, Decorating, Interface, chain_of
@@ -41,7 +41,7 @@ from potto.types.recursion import endless
 from potto.types.scope import Outside
 from potto.types.types import UNKNOWN, Diffeo, Dist, Function, Meta, Parameter, Real, Type, Unknown, groups_of, resolve
 from potto.types.unify import close_type, unify
-from potto.types.values import STILL, Closure, Port, Scalar, Source, TupleValue, Value
+from potto.types.values import STILL, AbstractFunction, AbstractScalar, Port, Source, TupleValue, Value
 
 MAX_ROUNDS = 20
 
@@ -58,14 +58,14 @@ class Typed:
 
 
 @value
-class Analysis:
+class DefinitionAnalysis:
     """What is known about one definition. Its parts are read through queries, which stand still when they do."""
 
     interface: Interface
     diagnostics: tuple[Diagnostic, ...]
     reasons: Reasons = NO_REASONS
     names: tuple[Typed, ...] = ()
-    parts: tuple[Part, ...] = ()
+    parts: tuple[NamedPart, ...] = ()
 
 
 def analyse(
@@ -73,7 +73,7 @@ def analyse(
     outsides: Mapping[DefinitionTarget, Outside],
     broken: Set[DefinitionTarget] = frozenset(),
     details: bool = True,
-) -> dict[DefinitionTarget, Analysis]:
+) -> dict[DefinitionTarget, DefinitionAnalysis]:
     """Analyse definitions that need each other (mostly one). Of what is `broken` the parser has spoken already.
 
     `details`: also what is only asked of definitions that somebody looks at, their reasons and names.
@@ -127,7 +127,7 @@ def _nothing(type: Type) -> Value:
     value: Value = STILL
     for group in reversed(groups_of(type)):
         inputs = tuple(symbolic(p.type, lambda: Source("input", ""), lambda: Port("")) for p in group)
-        value = Closure(inputs, value)
+        value = AbstractFunction(inputs, value)
     return Closing(value).value(value)
 
 
@@ -196,7 +196,7 @@ def _walk(inference: Inference, item: Written, flows: dict[DefinitionTarget, Val
             return walk.value(item.body)
         for condition in item.where:
             walk.value(condition)
-        components = TupleValue(tuple(Scalar(flat(walk.value(component))) for component in item.components))
+        components = TupleValue(tuple(AbstractScalar(flat(walk.value(component))) for component in item.components))
         if item.inverse is not None:
             walk.inputs(item.inverse.parameters)
             for component in item.inverse.components:
@@ -215,7 +215,7 @@ def _conclude(
     value: Value,
     skeleton: Type,
     details: bool,
-) -> Analysis:
+) -> DefinitionAnalysis:
     closing = Closing(value)
     decorating = Decorating(value)
     type = decorating.type(close_type(skeleton), value)
@@ -230,9 +230,9 @@ def _conclude(
     )
     found = _sorted((*inference.diagnostics, *walk.diagnostics, *lints(inference, walk, item)))
     if not details:
-        return Analysis(interface, found)
+        return DefinitionAnalysis(interface, found)
     names, reasons = typed(inference, walk), reasons_of(value, closing, decorating)
-    return Analysis(interface, found, reasons, names, parts(inference))
+    return DefinitionAnalysis(interface, found, reasons, names, parts(inference))
 
 
 def _named(sources: object, decorating: Decorating) -> tuple[str, ...]:
@@ -253,21 +253,21 @@ def typed(inference: Inference, walk: Walk) -> tuple[Typed, ...]:
     )
 
 
-def parts(inference: Inference) -> tuple[Part, ...]:
+def parts(inference: Inference) -> tuple[NamedPart, ...]:
     """The names of parts that a definition writes, with the types of what they are of."""
-    return tuple(Part(p.span, p.name, close_type(p.whole), close_type(p.type)) for p in inference.parts)
+    return tuple(NamedPart(p.span, p.name, close_type(p.whole), close_type(p.type)) for p in inference.parts)
 
 
 def local_type(type: Type, value: Value | None) -> Type:
     """A type inside a definition: a number says which variables of integration it varies with."""
     type = resolve(type)
-    if isinstance(type, Real) and isinstance(value, Scalar):
+    if isinstance(type, Real) and isinstance(value, AbstractScalar):
         varying = sorted((s for s in value.sources if s.kind == "variable"), key=lambda source: source.span)
         names = tuple(dict.fromkeys(source.name for source in varying))
         return Dist(names) if value.spikes else Real(variables=names)
-    if isinstance(value, Closure):
+    if isinstance(value, AbstractFunction):
         return Decorating(value).type(close_type(type), value)
     return close_type(type)
 
 
-quick(Typed, Analysis)
+quick(Typed, DefinitionAnalysis)

@@ -16,8 +16,9 @@ from potto.types.values import (
     NONE,
     STILL,
     Abstract,
+    AbstractFunction,
+    AbstractScalar,
     Choice,
-    Closure,
     Effect,
     ListValue,
     NoPort,
@@ -25,7 +26,6 @@ from potto.types.values import (
     PortFunction,
     PortTree,
     PortTuple,
-    Scalar,
     Source,
     Sources,
     Spike,
@@ -37,7 +37,7 @@ from potto.types.values import (
 
 
 @dataclass
-class Binding:
+class Substitution:
     """What stands for which symbolic input. `functions`: what is given for an input that is a function; `effects`: of
     the function that is called."""
 
@@ -51,8 +51,8 @@ class Binding:
 def call(function: Value, arguments: Sequence[Value], notes: Sequence[Step | None] = ()) -> tuple[Value, list[Effect]]:
     """What a function gives for one group of arguments, and what happens on the way."""
     match function:
-        case Closure(inputs, result, effects):
-            binding = Binding(effects=effects)
+        case AbstractFunction(inputs, result, effects):
+            binding = Substitution(effects=effects)
             given = _regroup(len(inputs), arguments)
             places = sorted(range(min(len(inputs), len(given))), key=lambda place: isinstance(inputs[place], Abstract))
             for place in places:  # functions last: where they jump hangs on what they are given
@@ -75,15 +75,15 @@ def _regroup(count: int, arguments: Sequence[Value]) -> Sequence[Value]:
         only = arguments[0]
         if isinstance(only, TupleValue) and len(only.items) == count:
             return only.items
-        return [Scalar(flat(only))] * count
+        return [AbstractScalar(flat(only))] * count
     return [TupleValue(tuple(arguments))] if count == 1 else [_all_of(arguments)] * count
 
 
-def _all_of(values: Iterable[Value]) -> Scalar:
+def _all_of(values: Iterable[Value]) -> AbstractScalar:
     found: Sources = NONE
     for value in values:
         found = merge(found, flat(value))
-    return Scalar(found)
+    return AbstractScalar(found)
 
 
 def _call_abstract(function: Abstract, arguments: Sequence[Value]) -> tuple[Value, list[Effect]]:
@@ -104,7 +104,7 @@ def _give(tree: PortTree, value: Value, hub: Sources, effects: list[Effect]) -> 
         case PortTuple(items):
             parts = value.items if isinstance(value, TupleValue) and len(value.items) == len(items) else None
             for place, item in enumerate(items):
-                hub = merge(hub, _give(item, parts[place] if parts else Scalar(flat(value)), hub, effects))
+                hub = merge(hub, _give(item, parts[place] if parts else AbstractScalar(flat(value)), hub, effects))
         case PortFunction(inputs, result):
             answer, further = call(value, [taint(symbol, hub) for symbol in inputs])
             effects += further
@@ -114,14 +114,14 @@ def _give(tree: PortTree, value: Value, hub: Sources, effects: list[Effect]) -> 
     return hub
 
 
-# Binding
+# Substitution
 
 
-def bind(symbol: Value, actual: Value, binding: Binding, note: Step | None = None) -> None:
+def bind(symbol: Value, actual: Value, binding: Substitution, note: Step | None = None) -> None:
     """Let `actual` stand for a symbolic input. A number may stand for a pair (a dual)."""
     if note is not None and not isinstance(symbol, Abstract):
         actual = noted(actual, note)
-    if isinstance(symbol, Scalar):
+    if isinstance(symbol, AbstractScalar):
         for source in symbol.sources:
             before = binding.values.get(source)
             binding.values[source] = actual if before is None else join(before, actual)
@@ -130,9 +130,9 @@ def bind(symbol: Value, actual: Value, binding: Binding, note: Step | None = Non
         case TupleValue(items):
             parts = actual.items if isinstance(actual, TupleValue) and len(actual.items) == len(items) else None
             for place, item in enumerate(items):
-                bind(item, parts[place] if parts else Scalar(flat(actual)), binding)
+                bind(item, parts[place] if parts else AbstractScalar(flat(actual)), binding)
         case ListValue(item):
-            bind(item, actual.item if isinstance(actual, ListValue) else Scalar(flat(actual)), binding)
+            bind(item, actual.item if isinstance(actual, ListValue) else AbstractScalar(flat(actual)), binding)
         case Abstract():
             for option in actual.options if isinstance(actual, Choice) else (actual,):
                 binding.functions.append((option, symbol, note))
@@ -142,17 +142,17 @@ def bind(symbol: Value, actual: Value, binding: Binding, note: Step | None = Non
             pass
 
 
-def _bind_function(symbol: Abstract, actual: Value, binding: Binding, note: Step | None) -> None:
+def _bind_function(symbol: Abstract, actual: Value, binding: Substitution, note: Step | None) -> None:
     """Bind what a function gives whatever its arguments, and what it passes to functions among its arguments."""
     if symbol.ports:
         before = binding.abstracts.get(id(symbol.ports))
         binding.abstracts[id(symbol.ports)] = actual if before is None else join(before, actual)
     answer: Value
     match actual:
-        case Closure(inputs, result, effects):
+        case AbstractFunction(inputs, result, effects):
             if _jumps(result):
                 result = _across(result, dict(_arriving(symbol.ports, inputs, binding)))
-            blank = Binding(dict.fromkeys(inputs_of(inputs), STILL))
+            blank = Substitution(dict.fromkeys(inputs_of(inputs), STILL))
             answer = substitute(result, blank)
             passed = _received([*effects, *_later_effects(result)], blank)
             for tree, own in zip(symbol.ports, inputs):
@@ -166,7 +166,7 @@ def _bind_function(symbol: Abstract, actual: Value, binding: Binding, note: Step
                     for source, passed_on in zip(tree.inputs, other.inputs):
                         bind(source, passed_on, binding)
         case _:
-            answer = Scalar(flat(actual))
+            answer = AbstractScalar(flat(actual))
     if isinstance(symbol.result, Abstract):
         _bind_function(symbol.result, answer, binding, note)
     else:
@@ -174,14 +174,14 @@ def _bind_function(symbol: Abstract, actual: Value, binding: Binding, note: Step
 
 
 def _arriving(
-    ports: Sequence[PortTree], inputs: Sequence[Value], binding: Binding
+    ports: Sequence[PortTree], inputs: Sequence[Value], binding: Substitution
 ) -> Iterable[tuple[Source, Surface | None]]:
     """What the inputs of a function that is passed vary with where the callee calls it; None for one that is given
     nothing but what the callee integrates over."""
     for tree, own in zip(ports, inputs):
         if isinstance(tree, PortTuple) and isinstance(own, TupleValue):
             yield from _arriving(tree.items, own.items, binding)
-        elif isinstance(tree, Port) and isinstance(own, Scalar):
+        elif isinstance(tree, Port) and isinstance(own, AbstractScalar):
             values = [effect.value for effect in binding.effects if effect.to is tree]
             bound = {source for value in values for source in flat(value) if source.kind == "variable"}
             found = {source for value in values for source in flat(substitute(value, binding))} - bound
@@ -190,27 +190,27 @@ def _arriving(
 
 
 def _jumps(value: Value) -> bool:
-    while isinstance(value, Closure):
+    while isinstance(value, AbstractFunction):
         value = value.result
     if isinstance(value, TupleValue):
         return any(map(_jumps, value.items))
-    return isinstance(value, Scalar) and bool(value.jumps or value.spikes)
+    return isinstance(value, AbstractScalar) and bool(value.jumps or value.spikes)
 
 
 def _across(value: Value, where: Mapping[Source, Surface | None]) -> Value:
     """A value with its surfaces and deltas as the callee has them: gone where it integrates over them."""
-    if isinstance(value, Scalar):
+    if isinstance(value, AbstractScalar):
         if not (value.jumps or value.spikes):
             return value
         jumps = {moved for surface in value.jumps if (moved := _moved(surface, where))}
         over = {(moved, spike.key) for spike in value.spikes if (moved := _moved(spike.over, where))}
         spikes = frozenset(Spike(moved, key) for moved, key in over)
-        return Scalar(value.sources, frozenset(jumps), spikes, value.carriers)
+        return AbstractScalar(value.sources, frozenset(jumps), spikes, value.carriers)
     match value:
         case TupleValue(items):
             return TupleValue(tuple(_across(item, where) for item in items))
-        case Closure(inputs, result, effects):
-            return Closure(inputs, _across(result, where), effects)
+        case AbstractFunction(inputs, result, effects):
+            return AbstractFunction(inputs, _across(result, where), effects)
         case _:
             return value
 
@@ -228,7 +228,7 @@ def _moved(surface: Surface, where: Mapping[Source, Surface | None]) -> Surface:
 
 def _later_effects(result: Value) -> list[Effect]:
     found: list[Effect] = []
-    while isinstance(result, Closure):
+    while isinstance(result, AbstractFunction):
         found += result.effects
         result = result.result
     return found
@@ -237,10 +237,10 @@ def _later_effects(result: Value) -> list[Effect]:
 # Substituting
 
 
-def substitute(value: Value, binding: Binding) -> Value:
+def substitute(value: Value, binding: Substitution) -> Value:
     """A value with what is bound put in."""
     values = binding.values
-    if isinstance(value, Scalar):
+    if isinstance(value, AbstractScalar):
         if values.keys().isdisjoint(value.sources):
             return value
         return _substitute_scalar(value, values)
@@ -249,9 +249,9 @@ def substitute(value: Value, binding: Binding) -> Value:
             return TupleValue(tuple(substitute(item, binding) for item in items))
         case ListValue(item):
             return ListValue(substitute(item, binding))
-        case Closure(inputs, result, effects):
+        case AbstractFunction(inputs, result, effects):
             inner = _not_hidden(binding, inputs)
-            return Closure(inputs, substitute(result, inner), tuple(played(effects, inner)))
+            return AbstractFunction(inputs, substitute(result, inner), tuple(played(effects, inner)))
         case Abstract(ports, result, tainted):
             known = binding.abstracts.get(id(ports))
             if known is not None:
@@ -261,13 +261,13 @@ def substitute(value: Value, binding: Binding) -> Value:
             return joined(substitute(option, binding) for option in options)
 
 
-def _not_hidden(binding: Binding, inputs: tuple[Value, ...]) -> Binding:
+def _not_hidden(binding: Substitution, inputs: tuple[Value, ...]) -> Substitution:
     """The binding inside a function, whose own inputs hide those outside (interfaces share their symbols)."""
     own = [source for source in inputs_of(inputs) if source in binding.values]
     if not own:
         return binding
     values = {source: value for source, value in binding.values.items() if source not in own}
-    return Binding(values, binding.functions, binding.ports, binding.abstracts)
+    return Substitution(values, binding.functions, binding.ports, binding.abstracts)
 
 
 def _substitute_sources(sources: Sources, values: dict[Source, Value]) -> Sources:
@@ -284,7 +284,7 @@ def _substitute_sources(sources: Sources, values: dict[Source, Value]) -> Source
     return found  # type: ignore[return-value]
 
 
-def _substitute_scalar(value: Scalar, values: dict[Source, Value]) -> Value:
+def _substitute_scalar(value: AbstractScalar, values: dict[Source, Value]) -> Value:
     jumps, spikes = value.jumps, value.spikes
     if jumps:
         jumps = frozenset(_surfaces(jumps, values))
@@ -292,14 +292,14 @@ def _substitute_scalar(value: Scalar, values: dict[Source, Value]) -> Value:
         spikes = frozenset(Spike(_surface(spike.over, values), "") for spike in spikes)
     for source in value.sources:
         actual = values.get(source)
-        if isinstance(actual, Scalar):
+        if isinstance(actual, AbstractScalar):
             jumps, spikes = jumps | actual.jumps, spikes | actual.spikes
     if not value.carriers:
-        return Scalar(_substitute_sources(value.sources, values), jumps, spikes)
+        return AbstractScalar(_substitute_sources(value.sources, values), jumps, spikes)
     carried = [values[source] for source in value.carriers if source in values]
     plain = {s: trail for s, trail in value.sources.items() if s not in value.carriers or s not in values}
     carriers = frozenset(source for source in value.carriers if source not in values)
-    base = Scalar(_substitute_sources(plain, values), jumps, spikes, carriers)
+    base = AbstractScalar(_substitute_sources(plain, values), jumps, spikes, carriers)
     if not carried:
         return base
     whole = joined(carried)
@@ -324,7 +324,7 @@ def _surface(surface: Surface, values: dict[Source, Value]) -> Surface:
 # Effects
 
 
-def played(effects: Iterable[Effect], binding: Binding) -> list[Effect]:
+def played(effects: Iterable[Effect], binding: Substitution) -> list[Effect]:
     """Effects with what is bound put in; what reaches a function that is bound is played through it."""
     found: list[Effect] = []
     received: dict[Port, Value] = {}
@@ -333,7 +333,7 @@ def played(effects: Iterable[Effect], binding: Binding) -> list[Effect]:
         if isinstance(effect.to, Port) and effect.to in binding.ports:
             before = received.get(effect.to)
             received[effect.to] = value if before is None else join(before, value)
-        elif flat(value) or not isinstance(value, Scalar):
+        elif flat(value) or not isinstance(value, AbstractScalar):
             found.append(Effect(effect.to, value))
     if received:
         for actual, symbol, note in binding.functions:
@@ -351,7 +351,7 @@ def _replayed(actual: Value, symbol: Abstract, received: dict[Port, Value], note
     return effects
 
 
-def _received(effects: Iterable[Effect], binding: Binding) -> dict[Port, Value]:
+def _received(effects: Iterable[Effect], binding: Substitution) -> dict[Port, Value]:
     received: dict[Port, Value] = {}
     for effect in effects:
         if isinstance(effect.to, Port):
@@ -369,6 +369,6 @@ def _arrived(tree: PortTree, received: dict[Port, Value]) -> Value:
         case PortTuple(items):
             return TupleValue(tuple(_arrived(item, received) for item in items))
         case PortFunction(inputs, result):
-            return Closure(inputs, _arrived(result, received))
+            return AbstractFunction(inputs, _arrived(result, received))
         case NoPort():
             return STILL

@@ -1,7 +1,7 @@
 """Calls: which arguments fill which parameters, and what is said when they do not.
 
-Owns `Plan`'s making. A function that is known has named groups: keywords bind by name in any group, the others fill the
-parameters that are left, in order. A group that gets nothing stays open (partial application); one that gets
+Owns `ArgumentPlan`'s making. A function that is known has named groups: keywords bind by name in any group, the others
+fill the parameters that are left, in order. A group that gets nothing stays open (partial application); one that gets
 something must get all. A group of n also takes one tuple of n, and one parameter that is a tuple takes its n parts. Of
 a function that is a parameter only the present group is known, and no names.
 """
@@ -19,14 +19,14 @@ from potto.syntax import nodes
 from potto.syntax.printer import print_expression
 from potto.syntax.written import without_parentheses
 from potto.types import kinds
-from potto.types.context import Inference, Plan, rule
+from potto.types.context import ArgumentPlan, Inference, rule
 from potto.types.forms import delta, deriv
 from potto.types.infer import is_known, special
 from potto.types.loading import loaded
 from potto.types.mismatches import between, comparison, describe, no_field, of_one
 from potto.types.motionless import check_tangents, takes_duals
 from potto.types.origins import misfit
-from potto.types.scope import Builtin
+from potto.types.scope import BuiltinName
 from potto.types.slopes import slope
 from potto.types.still import makes_dual, stands_still
 from potto.types.types import (
@@ -56,7 +56,7 @@ from potto.types.vectors import vector_form
 def _apply(inference: Inference, node: nodes.Apply) -> Type:
     form = special(inference, node.function)
     if form is not None:
-        inference.meanings[id(without_parentheses(node.function))] = Builtin(form)
+        inference.meanings[id(without_parentheses(node.function))] = BuiltinName(form)
         of_vectors = vector_form(form)
         if of_vectors is not None:
             return of_vectors(inference, node)
@@ -128,21 +128,21 @@ def _apply_unknown(inference: Inference, node: nodes.Apply, callee: Meta, types:
             node.function.span, message, label="its type would contain itself", help="to multiply, write `*`"
         ))  # fmt: skip
         return UNKNOWN
-    inference.plans[id(node)] = Plan((tuple((place,) for place in range(len(types))),))
+    inference.plans[id(node)] = ArgumentPlan((tuple((place,) for place in range(len(types))),))
     return result
 
 
 def _variadic(inference: Inference, node: nodes.Apply, types: Sequence[Type]) -> Type | None:
     """`min` and `max` take any number of arguments from two."""
     meaning = inference.meanings.get(id(without_parentheses(node.function)))
-    primitive = PRIMITIVES.get(meaning.name) if isinstance(meaning, Builtin) else None
+    primitive = PRIMITIVES.get(meaning.name) if isinstance(meaning, BuiltinName) else None
     if primitive is None or primitive.arity is not None or len(types) <= 2:
         return None
     for argument, type in zip(node.arguments, types):
         if argument.name is not None:
             inference.report(_no_names(argument, node))
         inference.need_number(type, argument.value, f"an argument of `{primitive.name}`")
-    inference.plans[id(node)] = Plan((tuple((place,) for place in range(len(types))),))
+    inference.plans[id(node)] = ArgumentPlan((tuple((place,) for place in range(len(types))),))
     return REAL
 
 
@@ -332,7 +332,7 @@ class _Filling:
         if takes_duals(self.parameters):
             self.inference.later(lambda: check_tangents(self.inference, self.node))
         if len(self.groups) == 1:  # and so it is filled
-            self.inference.plans[id(self.node)] = Plan((tuple(self.slots),), self.spread)
+            self.inference.plans[id(self.node)] = ArgumentPlan((tuple(self.slots),), self.spread)
             return callee.result
         plan: list[tuple[tuple[int, ...], ...] | None] = []
         left: list[tuple[Parameter, ...]] = []
@@ -344,7 +344,7 @@ class _Filling:
             if not filled:
                 left.append(group)
             start += len(group)
-        self.inference.plans[id(self.node)] = Plan(tuple(plan), self.spread)
+        self.inference.plans[id(self.node)] = ArgumentPlan(tuple(plan), self.spread)
         rest: Type = callee
         for _ in self.groups:
             rest = resolve(rest)

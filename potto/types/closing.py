@@ -11,17 +11,17 @@ from potto.types import kinds
 from potto.types.algebra import flat, steps
 from potto.types.flow import Walk
 from potto.types.interfaces import PLAIN_KINDS, Closing, Decorating, chain_of
-from potto.types.reasons import Given, Reason, Reasons
+from potto.types.reasons import GivenVariable, Reason, Reasons
 from potto.types.rules import REASON_TEXT
 from potto.types.values import (
     Abstract,
-    Closure,
+    AbstractFunction,
+    AbstractScalar,
     Effect,
     ListValue,
     Port,
     PortTree,
     PortTuple,
-    Scalar,
     Sink,
     Source,
     TupleValue,
@@ -31,7 +31,7 @@ from potto.types.values import (
 
 def declared(walk: Walk, groups: Sequence[Sequence[nodes.Parameter]], value: Value) -> Value:
     """Hold parameters to their annotations: `Real*` must accept what varies, `Real` takes only what does not."""
-    if not isinstance(value, Closure) or not any(p.annotation for group in groups for p in group):
+    if not isinstance(value, AbstractFunction) or not any(p.annotation for group in groups for p in group):
         return value
     closures = chain_of(value)
     effects = [effect for closure in closures for effect in closure.effects]
@@ -40,7 +40,7 @@ def declared(walk: Walk, groups: Sequence[Sequence[nodes.Parameter]], value: Val
         for parameter, symbol in zip(group, closure.inputs):
             if parameter.annotation is not None:
                 checking.parameter(parameter.name, parameter.annotation, symbol)
-    return Closure(value.inputs, value.result, (*value.effects, *checking.demands))
+    return AbstractFunction(value.inputs, value.result, (*value.effects, *checking.demands))
 
 
 class _Declared:
@@ -58,7 +58,7 @@ class _Declared:
 
     def parameter(self, name: str, annotation: nodes.TypeExpr, symbol: Value) -> None:
         match annotation, symbol:
-            case nodes.RealType(star=star), Scalar(sources):
+            case nodes.RealType(star=star), AbstractScalar(sources):
                 for source in sources:
                     self._number(name, annotation, source, star)
             case nodes.TupleType(items=items), TupleValue(parts):
@@ -76,7 +76,7 @@ class _Declared:
     def _number(self, name: str, annotation: nodes.TypeExpr, source: Source, star: bool) -> None:
         sink = self.sinks.get(source)
         if not star and sink is None:
-            self.demands.append(Effect(Sink("declared", annotation.span), Scalar({source: None})))
+            self.demands.append(Effect(Sink("declared", annotation.span), AbstractScalar({source: None})))
         elif star and sink is not None and sink.kind in PLAIN_KINDS:
             related = (Related(sink.span, REASON_TEXT[sink.kind]),) if sink.origin is None else ()
             self.walk.report(
@@ -112,7 +112,7 @@ class _Declared:
 def reasons_of(value: Value, closing: Closing, decorating: Decorating) -> Reasons:
     """Why which inputs must not vary, and what is given to the functions among them."""
     plain: dict[tuple[str, int], Reason] = {}
-    given: dict[int, Given] = {}
+    given: dict[int, GivenVariable] = {}
     for closure in chain_of(value):
         for effect in closure.effects:
             if isinstance(effect.to, Port):
@@ -140,7 +140,7 @@ def _note_reasons(
         plain[sink.kind, own.number] = Reason(sink.kind, own.number, name, span, way, text, further)
 
 
-def _note_given(effect: Effect, closing: Closing, given: dict[int, Given]) -> None:
+def _note_given(effect: Effect, closing: Closing, given: dict[int, GivenVariable]) -> None:
     assert isinstance(effect.to, Port)
     port = closing.ports.get(effect.to)
     if port is None or port.number in given:
@@ -148,5 +148,5 @@ def _note_given(effect: Effect, closing: Closing, given: dict[int, Given]) -> No
     for source in flat(effect.value):
         if source.kind == "variable":
             further = (source.origin, source.number) if isinstance(source.origin, DefinitionTarget) else None
-            given[port.number] = Given(port.number, source.name, source.span, further)
+            given[port.number] = GivenVariable(port.number, source.name, source.span, further)
             return

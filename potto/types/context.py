@@ -17,7 +17,7 @@ from potto.quick import quick, value
 from potto.source import Span
 from potto.syntax import nodes
 from potto.types.mismatches import mismatch, misused_derivative, not_a_number, shadowing
-from potto.types.scope import Local, LocalKind, Meaning, Member, Outside, Scope
+from potto.types.scope import Local, LocalKind, Meaning, Outside, RecursiveName, Scope
 from potto.types.types import (
     REAL,
     UNKNOWN,
@@ -30,8 +30,8 @@ from potto.types.types import (
     Real,
     TupleOf,
     Type,
+    TypeVariable,
     Unknown,
-    Var,
     dual_name,
     dual_of_array,
     dual_of_tuple,
@@ -66,7 +66,7 @@ def ensure_stack() -> None:
 
 
 @value
-class Plan:
+class ArgumentPlan:
     """Which arguments fill which parameters: per group its slots, or None if it stays open. A slot lists the arguments
     that fill the parameter (several make up its tuple). `spread`: the only argument is a tuple for the whole group."""
 
@@ -75,7 +75,7 @@ class Plan:
 
 
 @value
-class Part:
+class NamedPart:
     """The name of a part where it is written (`u.x`, `c with x = 1`): what it is of, and its type."""
 
     span: Span
@@ -92,7 +92,7 @@ class End(NamedTuple):
 
 
 @value
-class Reach:
+class IndexReach:
     """The least and the greatest that the index `name` of a range is."""
 
     name: str
@@ -133,19 +133,19 @@ class Inference:
         self.meanings: dict[int, Meaning] = {}
         self.binders: dict[int, Local] = {}
         self.locals: list[Local] = []
-        self.plans: dict[int, Plan] = {}
+        self.plans: dict[int, ArgumentPlan] = {}
         self.conditions: dict[int, Condition] = {}
         self.comparisons: list[nodes.Compare] = []
         self.brackets: set[int] = set()
         self.owners: dict[int, Meaning] = {}  # of members of no module, `u.x`: what `u` is
         self.fields: dict[int, list[int]] = {}  # of `u.x`, and of `c with x = 1`: where in the tuple it is
-        self.parts: list[Part] = []
+        self.parts: list[NamedPart] = []
         self.heads: set[int] = set()  # the parameters of the definition itself
         self.still: set[int] = set()  # arguments of derivatives that are given without their tangents
         self.sizes: dict[str, Type] = {}  # the names of sizes in annotations
         self.mixed: set[int] = set()  # the `and`, `or`, `not` of conditions, where brackets may stand
         self.integrals = 0  # how many integrals are around the place that is looked at
-        self.reaches: dict[int, Reach] = {}  # by locals: what the indices of loops reach where it is looked at
+        self.reaches: dict[int, IndexReach] = {}  # by locals: what the indices of loops reach where it is looked at
         self._late: list[Callable[[], None]] = []
         self._duals: list[_Pending] = []
         self._generation = 0  # of the dual that is being derived
@@ -219,7 +219,7 @@ class Inference:
 
     def recursive(self) -> bool:
         """Whether the definition refers to one of its own group."""
-        return any(isinstance(meaning, Member) for meaning in self.meanings.values())
+        return any(isinstance(meaning, RecursiveName) for meaning in self.meanings.values())
 
     def loop(self) -> Reaching:
         """What indices reach in a loop is forgotten behind it."""
@@ -266,7 +266,7 @@ class Inference:
         """D of a type, as far as it is known: what is not known yet follows when it is. `node` is what is derived."""
         type = resolve(type)
         match type:
-            case Real() | Dist() | Var():
+            case Real() | Dist() | TypeVariable():
                 return TupleOf((REAL, REAL), dual=True)
             case TupleOf(items, dual):
                 settle(type)  # its dual is not known before its parts are
@@ -333,7 +333,7 @@ class Reaching:
 
     __slots__ = ("_around", "_inference", "_inside")
 
-    def __init__(self, inference: Inference, inside: dict[int, Reach]) -> None:
+    def __init__(self, inference: Inference, inside: dict[int, IndexReach]) -> None:
         self._inference, self._inside, self._around = inference, inside, inference.reaches
 
     def __enter__(self) -> None:
@@ -343,4 +343,4 @@ class Reaching:
         self._inference.reaches = self._around
 
 
-quick(Plan, Part, Reach, _Pending)
+quick(ArgumentPlan, NamedPart, IndexReach, _Pending)

@@ -15,8 +15,9 @@ from potto.types.values import (
     HAZY,
     STILL,
     Abstract,
+    AbstractFunction,
+    AbstractScalar,
     Choice,
-    Closure,
     Effect,
     ListValue,
     NoPort,
@@ -24,7 +25,6 @@ from potto.types.values import (
     PortFunction,
     PortTree,
     PortTuple,
-    Scalar,
     Sink,
     Source,
     Sources,
@@ -37,7 +37,7 @@ from potto.types.values import (
 def dual(value: Value) -> Value:
     """What `deriv` makes of a function."""
     match value:
-        case Closure():
+        case AbstractFunction():
             return _Dual({}, {}).closure(value)
         case Abstract():
             return _dual_of_input(value)
@@ -69,10 +69,10 @@ def slope_value(value: Value, type: Type) -> Value:
 def _slope_group(function: Value, groups: tuple[tuple[Parameter, ...], ...], result: Type) -> Value:
     if not groups:
         tangent = function.items[1] if isinstance(function, TupleValue) and len(function.items) == 2 else function
-        return _shaped(tangent, result) if isinstance(tangent, Scalar) else tangent
+        return _shaped(tangent, result) if isinstance(tangent, AbstractScalar) else tangent
     inputs = tuple(map(_symbol, groups[0]))
     answer, effects = call(function, tuple(map(_doubled, inputs)))
-    return Closure(inputs, _slope_group(answer, groups[1:], result), tuple(effects))
+    return AbstractFunction(inputs, _slope_group(answer, groups[1:], result), tuple(effects))
 
 
 def _symbol(parameter: Parameter) -> Value:
@@ -80,7 +80,7 @@ def _symbol(parameter: Parameter) -> Value:
     return symbolic(parameter.type, lambda: Source("input", name), lambda: Port(name))
 
 
-def _shaped(value: Scalar, type: Type) -> Value:
+def _shaped(value: AbstractScalar, type: Type) -> Value:
     """The same for every number of a type."""
     match resolve(type):
         case TupleOf(items):
@@ -123,7 +123,7 @@ def _holds_functions(value: Value) -> bool:
         case ListValue(item):
             return _holds_functions(item)
         case _:
-            return not isinstance(value, Scalar)
+            return not isinstance(value, AbstractScalar)
 
 
 def _has_functions(tree: PortTree) -> bool:
@@ -136,20 +136,20 @@ class _Dual:
     def __init__(self, tangents: dict[Source, Source], ports: dict[Port, Port]) -> None:
         self.tangents, self.ports = tangents, ports
 
-    def closure(self, value: Closure) -> Closure:
+    def closure(self, value: AbstractFunction) -> AbstractFunction:
         for source in inputs_of(value.inputs):
             self.tangents[source] = Source("input", "d" + source.name, source.span)
         for port in ports_in(value.inputs):
             self.ports[port] = Port("d" + port.name)
         inputs = tuple(map(self.input, value.inputs))
-        result = self.closure(value.result) if isinstance(value.result, Closure) else self.result(value.result)
-        return Closure(inputs, result, tuple(e for effect in value.effects for e in self.effect(effect)))
+        result = self.closure(value.result) if isinstance(value.result, AbstractFunction) else self.result(value.result)
+        return AbstractFunction(inputs, result, tuple(e for effect in value.effects for e in self.effect(effect)))
 
     def input(self, symbol: Value) -> Value:
         match symbol:
-            case Scalar(sources):
+            case AbstractScalar(sources):
                 tangents: Sources = {self.tangents[source]: None for source in sources}
-                return TupleValue((Scalar(sources), Scalar(tangents)))
+                return TupleValue((AbstractScalar(sources), AbstractScalar(tangents)))
             case TupleValue(items):
                 return _transposed(tuple(map(self.input, items)))
             case ListValue(item):
@@ -172,33 +172,33 @@ class _Dual:
 
     def result(self, value: Value) -> Value:
         match value:
-            case Scalar():
+            case AbstractScalar():
                 return TupleValue((value, self.tangent(value)))
             case TupleValue(items):
                 return _transposed(tuple(map(self.result, items)))
             case ListValue(item):
                 return _columns(self.result(item))
-            case Closure():
+            case AbstractFunction():
                 return self.closure(value)
             case Abstract():
                 return _dual_of_input(value)
             case Choice(options):
                 return Choice(tuple(map(self.result, options)))
 
-    def tangent(self, value: Scalar) -> Scalar:
+    def tangent(self, value: AbstractScalar) -> AbstractScalar:
         own = {self.tangents[source]: trail for source, trail in value.sources.items() if source in self.tangents}
         spikes = value.spikes | {Spike(surface, "") for surface in value.jumps}
-        return Scalar(merge(value.sources, own), frozenset(), spikes)
+        return AbstractScalar(merge(value.sources, own), frozenset(), spikes)
 
     def effect(self, effect: Effect) -> list[Effect]:
         """What is passed to a function among the inputs now has a tangent; what must be plain has none."""
         value = effect.value
         if isinstance(effect.to, Sink):
             own = {self.tangents[source]: None for source in flat(value) if source in self.tangents}
-            return [effect, Effect(Sink("integral"), Scalar(own))] if own else [effect]  # D Real = (Real, Real)
+            return [effect, Effect(Sink("integral"), AbstractScalar(own))] if own else [effect]  # D Real = (Real, Real)
         if effect.to not in self.ports:
             return [effect]
-        tangent = self.tangent(value) if isinstance(value, Scalar) else value
+        tangent = self.tangent(value) if isinstance(value, AbstractScalar) else value
         return [effect, Effect(self.ports[effect.to], tangent)]
 
 
@@ -221,8 +221,8 @@ def _values_only(tree: PortTree) -> PortTree:
 
 def _doubled(value: Value) -> Value:
     match value:
-        case Scalar(sources):
-            return TupleValue((value, Scalar(sources)))
+        case AbstractScalar(sources):
+            return TupleValue((value, AbstractScalar(sources)))
         case TupleValue(items):
             return _transposed(tuple(map(_doubled, items)))
         case ListValue(item):

@@ -29,10 +29,10 @@ from potto.types.interfaces import localized
 from potto.types.rules import Violation, violation
 from potto.types.scope import Local
 from potto.types.values import (
-    Closure,
+    AbstractFunction,
+    AbstractScalar,
     Effect,
     Port,
-    Scalar,
     Sink,
     SinkKind,
     Source,
@@ -127,7 +127,7 @@ class Walk:
         if broken and sink.kind != "integral":
             self.report(violation(self.inference, Violation(sink, broken, span)))
         if demanded:
-            frame.effects.append(Effect(sink, Scalar(demanded)))
+            frame.effects.append(Effect(sink, AbstractScalar(demanded)))
 
     def _leave(self, frame: Frame) -> tuple[Effect, ...]:
         """The walk inside a function has ended: its effects. What concerns inputs further out happens there as well."""
@@ -168,7 +168,7 @@ class Walk:
         frame = Frame(set(inputs_of(inputs)), set(ports_in(inputs)))
         self.frames.append(frame)
         result = self.function(groups[1:], body)
-        return Closure(inputs, result, self._leave(frame))
+        return AbstractFunction(inputs, result, self._leave(frame))
 
     def bindings(self, block: Sequence[nodes.Binding]) -> None:
         for binding in block:
@@ -178,12 +178,12 @@ class Walk:
                 continue
             parts = value.items if isinstance(value, TupleValue) and len(value.items) == len(binding.targets) else None
             for place, target in enumerate(binding.targets):
-                self._bind(target, parts[place] if parts else Scalar(flat(value)))
+                self._bind(target, parts[place] if parts else AbstractScalar(flat(value)))
 
     def _bind(self, target: nodes.Binder, value: Value) -> None:
         local = self.inference.binders[id(target)]
         self.places[id(target)] = value
-        if isinstance(value, Scalar | TupleValue):
+        if isinstance(value, AbstractScalar | TupleValue):
             value = noted(value, Step(target.span, f"`{target.name}` is defined here"))
         self.locals[local] = value
 
@@ -203,11 +203,11 @@ def _split(effect: Effect, frame: Frame) -> tuple[Effect | None, Effect | None]:
     own = {source: trail for source, trail in sources.items() if source in frame.inputs}
     if not own:
         return None, effect
-    if not isinstance(effect.value, Scalar):
+    if not isinstance(effect.value, AbstractScalar):
         return effect, None
     outer = {source: trail for source, trail in sources.items() if source not in frame.inputs}
-    mine = Scalar(own, effect.value.jumps, effect.value.spikes, effect.value.carriers & frame.inputs)
-    return Effect(effect.to, mine), Effect(effect.to, Scalar(outer)) if outer else None
+    mine = AbstractScalar(own, effect.value.jumps, effect.value.spikes, effect.value.carriers & frame.inputs)
+    return Effect(effect.to, mine), Effect(effect.to, AbstractScalar(outer)) if outer else None
 
 
 quick(Surfaces)

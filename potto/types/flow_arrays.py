@@ -10,7 +10,7 @@ from collections.abc import Callable
 from potto.syntax import nodes
 from potto.types.algebra import flat, join, merge, taint, without
 from potto.types.flow import Walk, walks
-from potto.types.values import HAZY, NONE, ListValue, Scalar, Source, Sources, TupleValue, Value
+from potto.types.values import HAZY, NONE, AbstractScalar, ListValue, Source, Sources, TupleValue, Value
 
 MOST_ROUNDS = 20
 
@@ -27,7 +27,7 @@ def _index(walk: Walk, node: nodes.Index) -> Value:
 
 def element(array: Value) -> Value:
     """The value of an array's elements."""
-    return array.item if isinstance(array, ListValue) else Scalar(flat(array))
+    return array.item if isinstance(array, ListValue) else AbstractScalar(flat(array))
 
 
 @walks(nodes.Field)
@@ -45,7 +45,7 @@ def parts_of(walk: Walk, whole: Value, node: nodes.Field | nodes.Member) -> Valu
 def _part(whole: Value, place: int | None) -> Value:
     if isinstance(whole, TupleValue) and place is not None and place < len(whole.items):
         return whole.items[place]
-    return Scalar(flat(whole))
+    return AbstractScalar(flat(whole))
 
 
 @walks(nodes.Text)
@@ -58,7 +58,7 @@ def _with(walk: Walk, node: nodes.With) -> Value:
     whole = walk.value(node.record)
     given = [walk.value(argument.value) for argument in node.arguments]
     if not isinstance(whole, TupleValue):
-        return Scalar(flat(TupleValue((whole, *given))))
+        return AbstractScalar(flat(TupleValue((whole, *given))))
     items = list(whole.items)
     for place, value in zip(walk.inference.fields.get(id(node), ()), given):
         items[place] = value
@@ -79,7 +79,7 @@ def _clauses(walk: Walk, clauses: tuple[nodes.Clause, ...]) -> tuple[Sources, fr
                 decides = merge(decides, flat(bound))
             index = Source("other", clause.variable.name, clause.variable.span)
             indices.append(index)
-            value = Scalar({index: None})
+            value = AbstractScalar({index: None})
         else:
             value = element(walk.value(over))
         walk.locals[walk.inference.binders[id(clause.variable)]] = value
@@ -128,12 +128,12 @@ def _steps(walk: Walk, node: nodes.Fold, start: Value) -> Value:
 
 def _parts(state: Value, count: int) -> list[Value]:
     whole = isinstance(state, TupleValue) and len(state.items) == count
-    return list(state.items) if whole else [Scalar(flat(state))] * count  # type: ignore[union-attr]
+    return list(state.items) if whole else [AbstractScalar(flat(state))] * count  # type: ignore[union-attr]
 
 
 def _measure(value: Value) -> object:
     """What grows from round to round."""
-    if isinstance(value, Scalar):
+    if isinstance(value, AbstractScalar):
         return frozenset(value.sources), value.jumps, value.spikes
     if isinstance(value, TupleValue):
         return tuple(map(_measure, value.items))

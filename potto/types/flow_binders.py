@@ -9,7 +9,7 @@ from potto.syntax import nodes
 from potto.types.algebra import flat, merge, taint, without
 from potto.types.flow import Walk, walks
 from potto.types.rules import shown_delta
-from potto.types.values import HAZY, NONE, ListValue, Scalar, Source, Sources, TupleValue, Value
+from potto.types.values import HAZY, NONE, AbstractScalar, ListValue, Source, Sources, TupleValue, Value
 
 
 @walks(nodes.Integral)
@@ -31,8 +31,8 @@ def _integral(walk: Walk, node: nodes.Integral) -> Value:
         variables.append(_variable(walk, binder))
     body = walk.value(node.body)
     own = frozenset(variables)
-    result = taint(without(body, own), flat(without(Scalar(bounds), own)))
-    walk.sink("integral", node.span, Scalar(flat(result)))
+    result = taint(without(body, own), flat(without(AbstractScalar(bounds), own)))
+    walk.sink("integral", node.span, AbstractScalar(flat(result)))
     return result
 
 
@@ -40,7 +40,7 @@ def _variable(walk: Walk, binder: nodes.Binder, kind: Literal["variable", "other
     """What is integrated over; a measure of whole numbers is summed up, and moves nothing."""
     local = walk.inference.binders[id(binder)]
     source = Source(kind, binder.name, binder.span)
-    value = Scalar({source: None})
+    value = AbstractScalar({source: None})
     walk.locals[local] = value
     walk.places[id(binder)] = value
     return source
@@ -67,5 +67,5 @@ def walk_statement(walk: Walk, statement: nodes.Statement) -> None:
 def _shown(walk: Walk, expr: nodes.Expr) -> None:
     value = walk.value(expr)
     parts = value.items if isinstance(value, TupleValue) else (value,)
-    if any(isinstance(part, Scalar) and part.spikes for part in parts):
+    if any(isinstance(part, AbstractScalar) and part.spikes for part in parts):
         walk.report(shown_delta(expr))

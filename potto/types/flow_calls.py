@@ -12,20 +12,20 @@ from potto.syntax.written import without_parentheses
 from potto.types.algebra import flat, jumps_of, merge, still
 from potto.types.apply import call
 from potto.types.calls import callee_name
-from potto.types.context import Plan
+from potto.types.context import ArgumentPlan
 from potto.types.dualize import dual, resting, slope_value
 from potto.types.flow import Walk, walks
 from potto.types.flow_arrays import element
 from potto.types.rules import lone_delta, nonlinear
-from potto.types.scope import Builtin
+from potto.types.scope import BuiltinName
 from potto.types.types import Parameter, groups_of
 from potto.types.values import (
     HAZY,
     STILL,
-    Closure,
+    AbstractFunction,
+    AbstractScalar,
     Effect,
     ListValue,
-    Scalar,
     Sink,
     Source,
     Spike,
@@ -38,7 +38,7 @@ from potto.types.values import (
 @walks(nodes.Apply)
 def _apply(walk: Walk, node: nodes.Apply) -> Value:
     meaning = walk.inference.meanings.get(id(without_parentheses(node.function)))
-    name = meaning.name if isinstance(meaning, Builtin) else ""
+    name = meaning.name if isinstance(meaning, BuiltinName) else ""
     if name == "delta":
         return _delta(walk, node)
     if name == "load":
@@ -73,11 +73,11 @@ def _builtin(walk: Walk, node: nodes.Apply, name: str, arguments: Sequence[Value
     sources, jumps = STILL.sources, jumps_of(STILL)
     for argument, value in zip(node.arguments, arguments):
         sources, jumps = merge(sources, flat(value)), jumps | jumps_of(value)
-        if isinstance(value, Scalar) and value.spikes:
+        if isinstance(value, AbstractScalar) and value.spikes:
             walk.report(nonlinear(argument.value, f"take its `{name}`"))
         if PRIMITIVES[name].plain:
             walk.sink("jump", argument.value.span, value, node=name)
-    return Scalar(sources, jumps)
+    return AbstractScalar(sources, jumps)
 
 
 def _of_vectors(name: str, arguments: Sequence[Value]) -> Value:
@@ -93,14 +93,14 @@ def _of_vectors(name: str, arguments: Sequence[Value]) -> Value:
     return ListValue(found) if any(isinstance(each, ListValue) for each in arguments) else TupleValue((found,) * 3)
 
 
-def _all_of(values: Sequence[Value]) -> Scalar:
-    found = Scalar(STILL.sources)
+def _all_of(values: Sequence[Value]) -> AbstractScalar:
+    found = AbstractScalar(STILL.sources)
     for part in _leaves(values):
-        found = Scalar(merge(found.sources, part.sources), found.jumps | part.jumps)
+        found = AbstractScalar(merge(found.sources, part.sources), found.jumps | part.jumps)
     return found
 
 
-def _with_sources(value: Value, more: Scalar) -> Value:
+def _with_sources(value: Value, more: AbstractScalar) -> Value:
     """A number, or each of a tuple, that varies with more."""
     match value:
         case TupleValue(items):
@@ -111,14 +111,14 @@ def _with_sources(value: Value, more: Scalar) -> Value:
             return more
 
 
-def _leaves(values: Sequence[Value]) -> Iterator[Scalar]:
+def _leaves(values: Sequence[Value]) -> Iterator[AbstractScalar]:
     for value in values:
         if isinstance(value, TupleValue):
             yield from _leaves(value.items)
         elif isinstance(value, ListValue):
             yield from _leaves((value.item,))
         else:
-            yield value if isinstance(value, Scalar) else Scalar(flat(value))
+            yield value if isinstance(value, AbstractScalar) else AbstractScalar(flat(value))
 
 
 def builtin_value(name: str) -> Value:
@@ -127,15 +127,15 @@ def builtin_value(name: str) -> Value:
         return STILL
     if name in ("fst", "snd"):
         parts = [Source("input", "pair"), Source("input", "pair")]
-        pair = TupleValue(tuple(Scalar({part: None}, carriers=frozenset((part,))) for part in parts))
-        return Closure((pair,), pair.items[name == "snd"])
+        pair = TupleValue(tuple(AbstractScalar({part: None}, carriers=frozenset((part,))) for part in parts))
+        return AbstractFunction((pair,), pair.items[name == "snd"])
     primitive = PRIMITIVES.get(name)
     if primitive is None:
         return HAZY
     inputs = [Source("input", "x") for _ in range(primitive.arity or 2)]
-    everything = Scalar(dict.fromkeys(inputs))
+    everything = AbstractScalar(dict.fromkeys(inputs))
     effects = (Effect(Sink("jump", node=name), everything),) if primitive.plain else ()
-    return Closure(tuple(Scalar({source: None}) for source in inputs), everything, effects)
+    return AbstractFunction(tuple(AbstractScalar({source: None}) for source in inputs), everything, effects)
 
 
 def _delta(walk: Walk, node: nodes.Apply) -> Value:
@@ -151,7 +151,7 @@ def _delta(walk: Walk, node: nodes.Apply) -> Value:
         walk.report(lone_delta(node))
         return HAZY
     key = print_expression(node.arguments[0].value)
-    return Scalar(flat(TupleValue(tuple(values))), frozenset(), frozenset((Spike(over, key),)))
+    return AbstractScalar(flat(TupleValue(tuple(values))), frozenset(), frozenset((Spike(over, key),)))
 
 
 class _Calling:
@@ -161,7 +161,7 @@ class _Calling:
         self,
         walk: Walk,
         node: nodes.Apply,
-        plan: Plan,
+        plan: ArgumentPlan,
         groups: tuple[tuple[Parameter, ...], ...],
         arguments: list[Value],
     ) -> None:
@@ -179,10 +179,10 @@ class _Calling:
             return function, []
         slots = self.plan.groups[number]
         if slots is None:
-            if not isinstance(function, Closure) or all(group is None for group in self.plan.groups[number:]):
+            if not isinstance(function, AbstractFunction) or all(group is None for group in self.plan.groups[number:]):
                 return function, []
             inner, effects = self._groups(function.result, number + 1)
-            return Closure(function.inputs, inner, (*function.effects, *effects)), []
+            return AbstractFunction(function.inputs, inner, (*function.effects, *effects)), []
         values, notes = self._arguments(slots, number)
         value, effects = call(function, values, notes)
         further, more = self._groups(value, number + 1)
@@ -207,7 +207,7 @@ class _Calling:
         notes: list[Step | None] = []
         for index, place in enumerate(places):
             value = values[index]
-            if isinstance(value, Scalar) and not value.sources:  # no way leads through it
+            if isinstance(value, AbstractScalar) and not value.sources:  # no way leads through it
                 notes.append(None)
                 continue
             name = names[index] if index < len(names) else None

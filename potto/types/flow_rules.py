@@ -18,13 +18,13 @@ from potto.types.flow import Surfaces, Walk, walks
 from potto.types.flow_arrays import parts_of
 from potto.types.flow_calls import builtin_value
 from potto.types.rules import nonlinear, product_of_deltas
-from potto.types.scope import Builtin, Global, Local, Meaning, Member
+from potto.types.scope import BuiltinName, InterfaceName, Local, Meaning, RecursiveName
 from potto.types.types import UNKNOWN, Unknown
 from potto.types.values import (
     HAZY,
     STILL,
+    AbstractScalar,
     ListValue,
-    Scalar,
     Spike,
     Surface,
     TupleValue,
@@ -62,11 +62,11 @@ def _meant(walk: Walk, node: nodes.Name | nodes.Member, meaning: Meaning | None)
         walk.places[id(node)] = value
         return value
     match meaning:
-        case Global(target, interface):
+        case InterfaceName(target, interface):
             return HAZY if interface.broken else walk.known(target, interface.flow)
-        case Member(target):
+        case RecursiveName(target):
             return walk.known(target, walk.members[target])
-        case Builtin(name):
+        case BuiltinName(name):
             return builtin_value(name)
         case _:
             return HAZY
@@ -78,8 +78,8 @@ def _unary(walk: Walk, node: nodes.Unary) -> Value:
     return value if is_vector(walk.inference.types.get(id(node), UNKNOWN)) else _scalar(value)
 
 
-def _scalar(value: Value) -> Scalar:
-    return value if isinstance(value, Scalar) else Scalar(flat(value))
+def _scalar(value: Value) -> AbstractScalar:
+    return value if isinstance(value, AbstractScalar) else AbstractScalar(flat(value))
 
 
 @walks(nodes.Chain)
@@ -100,7 +100,7 @@ def _chain(walk: Walk, node: nodes.Chain) -> Value:
             elif operand.op == "*" and _same_delta(spikes, value.spikes):
                 walk.report(product_of_deltas(operand.value))
             spikes = spikes | value.spikes
-    return Scalar(sources, jumps, spikes)
+    return AbstractScalar(sources, jumps, spikes)
 
 
 def _vectors(walk: Walk, node: nodes.Chain) -> Value:
@@ -141,7 +141,7 @@ def _power(walk: Walk, node: nodes.Power) -> Value:
         walk.report(product_of_deltas(node.base))
     elif exponent.spikes:
         walk.report(nonlinear(node.exponent, "raise to it"))
-    return Scalar(merge(base.sources, exponent.sources), base.jumps | exponent.jumps)
+    return AbstractScalar(merge(base.sources, exponent.sources), base.jumps | exponent.jumps)
 
 
 @walks(nodes.Compare)
@@ -162,7 +162,7 @@ def _compare(walk: Walk, node: nodes.Compare) -> Value:
         if operand.op in ("==", "!="):
             equalities.add(Spike(surface, operand.op))
         sources, left = merge(sources, right.sources), right
-    return Scalar(sources, frozenset(surfaces), frozenset(equalities))
+    return AbstractScalar(sources, frozenset(surfaces), frozenset(equalities))
 
 
 @walks(nodes.Logic)
@@ -175,12 +175,12 @@ def _bracket(walk: Walk, node: nodes.Bracket) -> Value:
     return bracket(walk, node.span, _scalar(walk.value(node.condition)))
 
 
-def bracket(walk: Walk, span: Span, truth: Scalar) -> Scalar:
+def bracket(walk: Walk, span: Span, truth: AbstractScalar) -> AbstractScalar:
     """The number that a truth value in brackets is."""
     for spike in truth.spikes:
-        walk.sink("equality", span, Scalar({s: truth.sources.get(s) for s in spike.over}), node=spike.key)
+        walk.sink("equality", span, AbstractScalar({s: truth.sources.get(s) for s in spike.over}), node=spike.key)
     _met(walk, span, truth.jumps)
-    return Scalar(truth.sources, truth.jumps)
+    return AbstractScalar(truth.sources, truth.jumps)
 
 
 def _met(walk: Walk, span: Span, surfaces: Iterable[Surface]) -> None:
@@ -197,7 +197,7 @@ def _if(walk: Walk, node: nodes.If) -> Value:
     return taint(both, condition.sources, condition.jumps)
 
 
-def _jumping_condition(walk: Walk, node: nodes.If) -> Scalar:
+def _jumping_condition(walk: Walk, node: nodes.If) -> AbstractScalar:
     value = walk.value(node.condition)
     if walk.inference.conditions.get(id(node)) == "bracket":
         return _scalar(value)
@@ -205,10 +205,10 @@ def _jumping_condition(walk: Walk, node: nodes.If) -> Scalar:
     surface = frozenset(first.sources)
     if surface:
         _met(walk, node.condition.span, (surface,))
-    return Scalar(flat(value), frozenset((surface,)) if surface else frozenset())
+    return AbstractScalar(flat(value), frozenset((surface,)) if surface else frozenset())
 
 
-def plain_condition(walk: Walk, expr: nodes.Expr) -> Scalar:
+def plain_condition(walk: Walk, expr: nodes.Expr) -> AbstractScalar:
     """The value of a plain condition, each of whose parts must not vary."""
     expr = without_parentheses(expr)
     match expr:
@@ -221,7 +221,7 @@ def plain_condition(walk: Walk, expr: nodes.Expr) -> Scalar:
         case _:
             value = _scalar(walk.value(expr))
             walk.sink("condition", expr.span, value, node=expr)
-            return Scalar(value.sources)  # what is plain makes no surface
+            return AbstractScalar(value.sources)  # what is plain makes no surface
 
 
 @walks(nodes.InlineDiffeo)

@@ -24,8 +24,8 @@ from potto.types.types import (
     Truth,
     TupleOf,
     Type,
+    TypeVariable,
     Unknown,
-    Var,
     resolve,
     shifted,
 )
@@ -77,7 +77,7 @@ class _Printer:
                 return f"Diffeo[{'n' if dims is None else dims}]"
             case Truth():
                 return "a comparison"
-            case Var(name):
+            case TypeVariable(name):
                 return self._variable(name)
             case Meta(size=size) if size is not None:
                 return self._size(type, size)

@@ -15,7 +15,7 @@ from potto.syntax import nodes
 from potto.syntax.printer import print_expression
 from potto.syntax.written import number, without_parentheses
 from potto.types import kinds
-from potto.types.context import End, Inference, Reach, rule
+from potto.types.context import End, IndexReach, Inference, rule
 from potto.types.mismatches import between
 from potto.types.origins import defined
 from potto.types.scope import Local
@@ -41,7 +41,7 @@ class _Reached:
 
     low: End
     high: End
-    reach: Reach | None = None
+    reach: IndexReach | None = None
     down: bool = False
 
 
@@ -252,7 +252,7 @@ def goes_through(inference: Inference, local: Local, over: nodes.Range) -> None:
         return
     outer = lo.reach or hi.reach
     kept = {key: reach for key, reach in inference.reaches.items() if reach is not outer}
-    inference.reaches = {**kept, id(local): Reach(local.name, over, lo.low, hi.high)}
+    inference.reaches = {**kept, id(local): IndexReach(local.name, over, lo.low, hi.high)}
 
 
 def _at_most(low: End, high: End) -> bool:

@@ -18,7 +18,16 @@ from potto.types import kinds
 from potto.types.annotations import written_type
 from potto.types.context import Inference, rule
 from potto.types.mismatches import comparison, describe, mismatch
-from potto.types.scope import Builtin, Global, Local, Meaning, Member, Module, undefined, undefined_member
+from potto.types.scope import (
+    BuiltinName,
+    InterfaceName,
+    Local,
+    Meaning,
+    ModuleName,
+    RecursiveName,
+    undefined,
+    undefined_member,
+)
 from potto.types.types import (
     REAL,
     UNKNOWN,
@@ -72,7 +81,7 @@ def _member(inference: Inference, node: nodes.Member) -> Type:
     meaning = inference.outside.find(node.path, node.name) if local is None else None
     if meaning is None:
         whole = local or inference.outside.find(None, head)
-        type = REAL if whole is None or isinstance(whole, Module) else resolve(_meant(inference, node, whole))
+        type = REAL if whole is None or isinstance(whole, ModuleName) else resolve(_meant(inference, node, whole))
         if whole is not None and not isinstance(type, Meta | Real):  # what is unknown is told where it is bound
             inference.owners[id(node)] = whole
             return fields(inference, type, node)
@@ -87,14 +96,14 @@ def _meant(inference: Inference, node: nodes.Name | nodes.Member, meaning: Meani
         meaning.used = True
         known = meaning.type = resolve(meaning.type)
         return instantiate(known, meaning.generic, inference.level) if meaning.generic else known
-    if isinstance(meaning, Builtin):
+    if isinstance(meaning, BuiltinName):
         return _builtin(inference, node, meaning.name)
     match meaning:
-        case Global(_, interface):
+        case InterfaceName(_, interface):
             return UNKNOWN if interface.broken else open_type(interface.type, inference.level)
-        case Member(target):
+        case RecursiveName(target):
             return inference.members[target]
-        case Module(name):
+        case ModuleName(name):
             message = f"`{name}` is a module, not a value"
             inference.report(kinds.MISMATCH(node.span, message, label="a module", help=f"write `{name}.something`"))
             return UNKNOWN
@@ -330,7 +339,7 @@ def special(inference: Inference, expr: nodes.Expr) -> str | None:
         return None
     if expr.id not in SPECIALS and vector_form(expr.id) is None:
         return None
-    return expr.id if isinstance(inference.outside.find(None, expr.id), Builtin) else None
+    return expr.id if isinstance(inference.outside.find(None, expr.id), BuiltinName) else None
 
 
 def deriv_argument(inference: Inference, node: nodes.Apply) -> nodes.Expr | None:

@@ -36,8 +36,9 @@ from potto.types.values import (
     HAZY,
     NONE,
     Abstract,
+    AbstractFunction,
+    AbstractScalar,
     Choice,
-    Closure,
     Effect,
     ListValue,
     NoPort,
@@ -45,7 +46,6 @@ from potto.types.values import (
     PortFunction,
     PortTree,
     PortTuple,
-    Scalar,
     Sink,
     SinkKind,
     Source,
@@ -116,9 +116,9 @@ def _closed(
     jumps: frozenset[Surface] = frozenset(),
     spikes: frozenset[Spike] = frozenset(),
     carriers: frozenset[Source] = frozenset(),
-) -> Scalar:
+) -> AbstractScalar:
     """A number in an interface. Most interfaces have the same few, so that each is there once."""
-    return Scalar(dict.fromkeys(sources) or NONE, jumps, spikes, carriers)
+    return AbstractScalar(dict.fromkeys(sources) or NONE, jumps, spikes, carriers)
 
 
 @cache
@@ -161,10 +161,10 @@ for _kind in (Source, Port, Sink):
     copyreg.pickle(_kind, _told)
 
 
-def chain_of(value: Value) -> list[Closure]:
+def chain_of(value: Value) -> list[AbstractFunction]:
     """The groups of a function that is known."""
-    found: list[Closure] = []
-    while isinstance(value, Closure):
+    found: list[AbstractFunction] = []
+    while isinstance(value, AbstractFunction):
         found.append(value)
         value = value.result
     return found
@@ -180,17 +180,17 @@ class Closing:
         self._trees: dict[int, tuple[PortTree, ...]] = {}
 
     def value(self, value: Value) -> Value:
-        if isinstance(value, Scalar):
+        if isinstance(value, AbstractScalar):
             return self._scalar(value)
         match value:
             case TupleValue(items):
                 return TupleValue(tuple(map(self.value, items)))
             case ListValue(item):
                 return ListValue(self.value(item))
-            case Closure(inputs, result, effects):
+            case AbstractFunction(inputs, result, effects):
                 for source in inputs_of(inputs):  # a function inside a choice or a list has numbers of its own
                     self.sources.setdefault(source, _source(len(self.sources)))
-                return Closure(tuple(map(self.value, inputs)), self.value(result), self._effects(effects))
+                return AbstractFunction(tuple(map(self.value, inputs)), self.value(result), self._effects(effects))
             case Abstract(ports, result, taint):
                 trees = tuple(map(self._tree, ports))
                 trees = self._trees.setdefault(id(ports), trees)  # the identity of ports is that of the function
@@ -199,7 +199,7 @@ class Closing:
             case Choice(options):
                 return Choice(tuple(map(self.value, options)))
 
-    def _scalar(self, value: Scalar, variables: bool = False) -> Scalar:
+    def _scalar(self, value: AbstractScalar, variables: bool = False) -> AbstractScalar:
         known = self.sources
         sources = [known[source] for source in value.sources if source in known]
         if len(sources) > 1:
@@ -236,7 +236,7 @@ class Closing:
         return (*(sinks[key] for key in sorted(sinks)), *(ports[number] for number in sorted(ports)))
 
     def _payload(self, value: Value) -> Value:
-        return self._scalar(value, variables=True) if isinstance(value, Scalar) else self.value(value)
+        return self._scalar(value, variables=True) if isinstance(value, AbstractScalar) else self.value(value)
 
     def _tree(self, tree: PortTree) -> PortTree:
         match tree:
@@ -252,7 +252,7 @@ class Closing:
 
 def _both(a: Value, b: Value) -> Value:
     both = join(a, b)
-    if isinstance(both, Scalar):
+    if isinstance(both, AbstractScalar):
         return replace(both, sources=dict(sorted(both.sources.items(), key=lambda item: item[0].number)))
     return both
 
@@ -263,9 +263,9 @@ def _both(a: Value, b: Value) -> Value:
 def localized(value: Value, target: DefinitionTarget) -> Value:
     """An interface's flow with its sinks and its variables of integration marked as those of `target`."""
     match value:
-        case Closure(inputs, result, effects):
+        case AbstractFunction(inputs, result, effects):
             moved = tuple(_localized_effect(effect, target) for effect in effects)
-            return Closure(inputs, localized(result, target), moved)
+            return AbstractFunction(inputs, localized(result, target), moved)
         case Choice(options):
             return Choice(tuple(localized(option, target) for option in options))
         case ListValue(item):
@@ -280,7 +280,7 @@ def _localized_effect(effect: Effect, target: DefinitionTarget) -> Effect:
             return effect
         return Effect(Sink(effect.to.kind, number=effect.to.number, origin=target), effect.value)
     value = effect.value
-    if isinstance(value, Scalar) and VARYING in value.sources:
+    if isinstance(value, AbstractScalar) and VARYING in value.sources:
         theirs = Source("variable", "", number=effect.to.number, origin=target)
         sources = {theirs if source is VARYING else source: trail for source, trail in value.sources.items()}
         return Effect(effect.to, replace(value, sources=sources))
@@ -307,12 +307,12 @@ class Decorating:
         self.roles: dict[Source, str] = {}
 
     def type(self, type: Type, value: Value) -> Type:
-        if isinstance(value, Scalar):
+        if isinstance(value, AbstractScalar):
             return self._result(value) if isinstance(type, Real) else type
         if isinstance(type, Function) and isinstance(value, Choice):
             value = value.options[0]
         match type, value:
-            case Function(group, result), Closure(inputs, answer):
+            case Function(group, result), AbstractFunction(inputs, answer):
                 regrouped = inputs if len(inputs) == len(group) else ()
                 for parameter, symbol in zip(group, regrouped):
                     self._name(parameter.name or "_", symbol)
@@ -344,7 +344,7 @@ class Decorating:
             return group
         return tuple(Parameter(p.name, self._input(p.type, s, self.settled)) for p, s in zip(group, inputs))
 
-    def _result(self, value: Scalar) -> Type:
+    def _result(self, value: AbstractScalar) -> Type:
         if value.spikes:
             return Dist(self._over(spike.over for spike in value.spikes))
         return Real(jumps=self._over(value.jumps)) if value.jumps else REAL
@@ -358,7 +358,7 @@ class Decorating:
 
     def _input(self, type: Type, value: Value, still: set[Source] | None) -> Type:
         """The type of an input. `still`: the sources at which it is `Real`; None where no star is printed."""
-        if isinstance(type, Real) and isinstance(value, Scalar):
+        if isinstance(type, Real) and isinstance(value, AbstractScalar):
             return REAL if still is None or not still.isdisjoint(value.sources) else STARRED
         match type, value:
             case TupleOf(items), TupleValue(parts) if len(items) == len(parts):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 from potto.data.mistakes import TITLES, DataMistake
-from potto.data.values import SEPARATOR, Columns, Row, Shape, Sizes
+from potto.data.values import SEPARATOR, Columns, NumberRow, Shape, Sizes
 from potto.diagnostics import Diagnostic, Related, declare
 from potto.modules.data import data_file, path_of
 from potto.modules.texts import source
@@ -48,7 +48,7 @@ def type_of(shape: Shape, path: str, name: str = "") -> Type:
         return TupleOf(tuple(items), record=record)
     if not isinstance(shape, Sizes):
         return REAL
-    found: Type = TupleOf((REAL,) * shape.item.length) if isinstance(shape.item, Row) else REAL
+    found: Type = TupleOf((REAL,) * shape.item.length) if isinstance(shape.item, NumberRow) else REAL
     for size in reversed(shape.dimensions):
         found = ArrayOf(Count(size), found)
     return found

@@ -16,9 +16,9 @@ from potto.syntax import nodes
 from potto.syntax.printer import print_expression
 from potto.syntax.written import without_parentheses
 from potto.types import kinds
-from potto.types.context import Inference, Plan
+from potto.types.context import ArgumentPlan, Inference
 from potto.types.mismatches import around
-from potto.types.scope import Builtin, Global, Local
+from potto.types.scope import BuiltinName, InterfaceName, Local
 from potto.types.types import REAL, Dist, Function, Parameter, Real, TupleOf, Type, groups_of, resolve
 
 LONGEST = 60  # characters of a call that a help writes out
@@ -73,14 +73,14 @@ def is_derivative(inference: Inference, expr: nodes.Expr) -> bool:
                 if isinstance(meaning, Local) and meaning.kind == "local" and meaning.value is not None:
                     expr = meaning.value
                 else:
-                    return isinstance(meaning, Global) and meaning.interface.derivative
+                    return isinstance(meaning, InterfaceName) and meaning.interface.derivative
             case _:
                 return False
 
 
 def _derives(inference: Inference, node: nodes.Apply) -> bool:
     meaning = inference.meanings.get(id(without_parentheses(node.function)))
-    return isinstance(meaning, Builtin) and meaning.name == "deriv"
+    return isinstance(meaning, BuiltinName) and meaning.name == "deriv"
 
 
 def head_of(inference: Inference, call: nodes.Apply) -> nodes.Expr:
@@ -100,7 +100,7 @@ def _calls(inference: Inference, node: nodes.Apply) -> tuple[list[nodes.Apply], 
         head = head.function
 
 
-def _carries(inference: Inference, call: nodes.Apply, plan: Plan) -> bool:
+def _carries(inference: Inference, call: nodes.Apply, plan: ArgumentPlan) -> bool:
     """Whether one of the arguments has a tangent, or may have."""
     if any(slots is not None and any(len(slot) > 1 for slot in slots) for slots in plan.groups):
         return True  # several make up one parameter: the value and its tangent

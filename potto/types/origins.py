@@ -12,7 +12,7 @@ from potto.syntax.written import without_parentheses
 from potto.types.context import Inference
 from potto.types.format import format_type
 from potto.types.mismatches import BY_PARTS, differs_in_size, mismatch, sized_by
-from potto.types.scope import Global, Local
+from potto.types.scope import InterfaceName, Local
 from potto.types.still import lacks_tangents
 from potto.types.types import Parameter, Type, holds_functions
 
@@ -29,7 +29,7 @@ def defined(inference: Inference, array: nodes.Expr, what: str) -> tuple[Related
         meaning = inference.meanings.get(id(array))
     if isinstance(meaning, Local):
         return (Related(meaning.span, f"`{meaning.name}` {what}"),)
-    if not isinstance(meaning, Global):
+    if not isinstance(meaning, InterfaceName):
         return ()
     file, name = meaning.target.file, meaning.target.name
     item = definition(inference.outside.db, file, name)
@@ -70,7 +70,7 @@ def misfit(
 def _declared(inference: Inference, function: nodes.Expr, place: int, name: str | None) -> tuple[Related, ...]:
     """Where a parameter of a definition is declared, by its place: `name` may be a sign for a name."""
     meaning = inference.meanings.get(id(without_parentheses(function)))
-    if not isinstance(meaning, Global) or name is None:
+    if not isinstance(meaning, InterfaceName) or name is None:
         return ()
     file, owner = meaning.target.file, meaning.target.name
     item = definition(inference.outside.db, file, owner)

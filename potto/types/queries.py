@@ -20,8 +20,8 @@ from potto.quick import quick, value
 from potto.syntax import nodes
 from potto.types import motionless
 from potto.types.algebra import symbolic
-from potto.types.analysis import Analysis, Typed, analyse, local_type, parts, typed
-from potto.types.context import Inference, Part, ensure_stack
+from potto.types.analysis import DefinitionAnalysis, Typed, analyse, local_type, parts, typed
+from potto.types.context import Inference, NamedPart, ensure_stack
 from potto.types.flow import Walk
 from potto.types.flow_binders import walk_statement
 from potto.types.hidden_names import only_called, with_names, without_names
@@ -29,7 +29,7 @@ from potto.types.integrals import statement as infer_statement
 from potto.types.interfaces import Interface, unknown_interface
 from potto.types.lints import lints
 from potto.types.reasons import Reasons
-from potto.types.scope import Global, Local, Meaning, Member, Module, Outside
+from potto.types.scope import InterfaceName, Local, Meaning, ModuleName, Outside, RecursiveName
 from potto.types.types import Type
 from potto.types.unify import bare, open_type
 from potto.types.values import Port, Source, Value
@@ -90,13 +90,13 @@ def typed_names(db: Database, file: str, name: str) -> tuple[Typed, ...]:
 
 
 @query
-def typed_parts(db: Database, file: str, name: str) -> tuple[Part, ...]:
+def typed_parts(db: Database, file: str, name: str) -> tuple[NamedPart, ...]:
     """The names of parts that a definition writes, `u.x` and `c with x = 1`, and what they are parts of."""
     found = db.entry(_details, (_group(db, file, name),), DefinitionTarget(file, name))
     return () if found is None else found.parts
 
 
-def _analysis(db: Database, file: str, name: str) -> Analysis | None:
+def _analysis(db: Database, file: str, name: str) -> DefinitionAnalysis | None:
     """The analysis of a definition. One that stands alone is read whole: that is verified in one step less."""
     group, target = _group(db, file, name), DefinitionTarget(file, name)
     return _analyses(db, group).get(target) if len(group) == 1 else db.entry(_analyses, (group,), target)
@@ -106,24 +106,26 @@ def _group(db: Database, file: str, name: str) -> tuple[DefinitionTarget, ...]:
     return strongly_connected(db, file, name)
 
 
-def _nothing(db: Database, group: tuple[DefinitionTarget, ...]) -> dict[DefinitionTarget, Analysis]:
+def _nothing(db: Database, group: tuple[DefinitionTarget, ...]) -> dict[DefinitionTarget, DefinitionAnalysis]:
     """In a cycle that the graph of definitions does not show there is nothing to be known."""
     return {}
 
 
 @query(cycle=_nothing)
-def _analyses(db: Database, group: tuple[DefinitionTarget, ...]) -> dict[DefinitionTarget, Analysis]:
+def _analyses(db: Database, group: tuple[DefinitionTarget, ...]) -> dict[DefinitionTarget, DefinitionAnalysis]:
     """The analyses of definitions that need each other."""
     return _analysed(db, group, details=False)
 
 
 @query(cycle=_nothing, keep=256)
-def _details(db: Database, group: tuple[DefinitionTarget, ...]) -> dict[DefinitionTarget, Analysis]:
+def _details(db: Database, group: tuple[DefinitionTarget, ...]) -> dict[DefinitionTarget, DefinitionAnalysis]:
     """The same with all that is asked only where somebody looks: kept for few, and made anew for others."""
     return _analysed(db, group, details=True)
 
 
-def _analysed(db: Database, group: tuple[DefinitionTarget, ...], details: bool) -> dict[DefinitionTarget, Analysis]:
+def _analysed(
+    db: Database, group: tuple[DefinitionTarget, ...], details: bool
+) -> dict[DefinitionTarget, DefinitionAnalysis]:
     items = {}
     for target in group:
         item = definition(db, target.file, target.name)
@@ -157,15 +159,15 @@ def _outside(
         if path is not None and target is not None and resolve_member(db, file, path, name) is None:
             name, path = path.partition(".")[0], None  # a field of a definition
         if isinstance(target, ModuleTarget):
-            known[path, name] = Module(name)
+            known[path, name] = ModuleName(name)
         elif target is not None and isinstance(group, dict) and target in group:
-            known[path, name] = Member(target)
+            known[path, name] = RecursiveName(target)
         elif target is not None:
             if nameless is None:
                 assert caller is not None
                 nameless = only_called(caller)
             of = called if (path, name) in nameless else interface
-            known[path, name] = Global(target, of(db, target.file, target.name))
+            known[path, name] = InterfaceName(target, of(db, target.file, target.name))
     return Outside(db, file, lambda target: plain_reasons(db, target.file, target.name), known)
 
 
@@ -191,7 +193,7 @@ def check_statement(db: Database, file: str, statement: nodes.Statement) -> tupl
 
 
 @query(keep=1024)
-def statement_parts(db: Database, file: str, statement: nodes.Statement) -> tuple[Part, ...]:
+def statement_parts(db: Database, file: str, statement: nodes.Statement) -> tuple[NamedPart, ...]:
     """The names of parts in a statement of a script, or in an expression by itself."""
     ensure_stack()
     inference = Inference(_outside(db, file, _used(statement)), {})

@@ -28,7 +28,7 @@ class Reason:
 
 
 @value
-class Given:
+class GivenVariable:
     """Which variable of integration a definition gives to a function that is its parameter."""
 
     number: int
@@ -42,16 +42,16 @@ class Reasons:
     """What a definition demands and why, with places. Not part of the interface: edits move it."""
 
     plain: tuple[Reason, ...] = ()
-    given: tuple[Given, ...] = ()
+    given: tuple[GivenVariable, ...] = ()
 
     def reason(self, kind: SinkKind, number: int) -> Reason | None:
         return next((r for r in self.plain if r.kind == kind and r.number == number), None)
 
-    def given_at(self, number: int) -> Given | None:
+    def given_at(self, number: int) -> GivenVariable | None:
         return next((g for g in self.given if g.number == number), None)
 
 
 NO_REASONS = Reasons()
 
 
-quick(Reason, Given, Reasons)
+quick(Reason, GivenVariable, Reasons)

@@ -14,9 +14,9 @@ from potto.syntax import nodes
 from potto.syntax.habits import ARRAY_TYPE, ARRAYS
 from potto.syntax.kinds import BAD_TYPE
 from potto.types import kinds
-from potto.types.context import Inference, Part, rule
+from potto.types.context import Inference, NamedPart, rule
 from potto.types.mismatches import describe, no_field
-from potto.types.scope import Global, Meaning, Member, names_at_top
+from potto.types.scope import InterfaceName, Meaning, RecursiveName, names_at_top
 from potto.types.types import UNKNOWN, Meta, RecordName, TupleOf, Type, Unknown, resolve, result_of
 from potto.types.unify import open_type
 
@@ -36,13 +36,13 @@ def named_type(inference: Inference, annotation: nodes.NamedType, known: str) ->
     """The record that the name of a type means."""
     path, _, name = annotation.name.rpartition(".")
     meaning = inference.outside.find(path or None, name)
-    if isinstance(meaning, Global) and meaning.interface.broken:
+    if isinstance(meaning, InterfaceName) and meaning.interface.broken:
         return UNKNOWN
-    if isinstance(meaning, Global):
+    if isinstance(meaning, InterfaceName):
         found = result_of(meaning.interface.type)
         if isinstance(found, TupleOf) and found.record is not None and found.record.name == meaning.target.name:
             return open_type(found, inference.level)
-    if isinstance(meaning, Member) and _is_record(inference, meaning.target):
+    if isinstance(meaning, RecursiveName) and _is_record(inference, meaning.target):
         inference.report(_within_itself(inference, annotation, meaning.target))
     else:
         inference.report(_no_type(inference, annotation, meaning, known))
@@ -108,7 +108,7 @@ def _with(inference: Inference, node: nodes.With) -> Type:
         place = record.fields.index(argument.name)
         inference.expect(given, found.items[place], argument.value, f"the field `{argument.name}`")
         places.append(place)
-        inference.parts.append(Part(argument.name_span or argument.span, argument.name, found, found.items[place]))
+        inference.parts.append(NamedPart(argument.name_span or argument.span, argument.name, found, found.items[place]))
     inference.fields[id(node)] = places
     if record is None and not isinstance(found, Unknown):
         inference.report(_no_record(node, found))

@@ -16,7 +16,7 @@ from potto.syntax.nodes import Node
 from potto.syntax.walk import children
 from potto.types import kinds
 from potto.types.context import Inference
-from potto.types.scope import Member
+from potto.types.scope import RecursiveName
 
 Mention = nodes.Name | nodes.Member
 Found = Mapping[DefinitionTarget, tuple[Diagnostic, ...]]
@@ -47,7 +47,7 @@ def _unguarded(item: Node, inference: Inference) -> Iterator[tuple[Mention, Defi
             continue
         if isinstance(node, nodes.Name | nodes.Member):
             meaning = inference.meanings.get(id(node))
-            if isinstance(meaning, Member):
+            if isinstance(meaning, RecursiveName):
                 yield node, meaning.target
         stack.extend(reversed(children(node)))
 

@@ -19,7 +19,7 @@ from potto.syntax.printer import print_expression
 from potto.types import kinds
 from potto.types.algebra import steps
 from potto.types.context import Inference
-from potto.types.reasons import Given, Reason
+from potto.types.reasons import GivenVariable, Reason
 from potto.types.values import Sink, SinkKind, Source, Trail
 
 MAX_STEPS = 6  # steps of a way that a message shows
@@ -96,7 +96,7 @@ class _Wording:
         given, owner = self._origin(source)
         return f"`{given.variable}` of `{owner.name}`" if given is not None else f"of `{owner.name}`"
 
-    def _origin(self, source: Source) -> tuple[Given | None, DefinitionTarget]:
+    def _origin(self, source: Source) -> tuple[GivenVariable | None, DefinitionTarget]:
         """Where another definition's variable of integration is bound."""
         target, number = source.origin, source.number
         assert isinstance(target, DefinitionTarget)

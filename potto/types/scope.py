@@ -15,7 +15,7 @@ from typing import Literal
 from potto.diagnostics import Diagnostic, Related, Replacement, Suggestion
 from potto.modules.builtins import CONSTANTS, PROJECTIONS, SPECIALS, VECTORS, is_builtin
 from potto.modules.hints import called_here, elsewhere, known_elsewhere
-from potto.modules.lookup import Defined, DefinitionTarget, find_module, meaning, preludes, resolve_module
+from potto.modules.lookup import DefinitionBinding, DefinitionTarget, find_module, meaning, preludes, resolve_module
 from potto.modules.texts import definition, imports, names
 from potto.primitives import PRIMITIVES
 from potto.query import Database, query
@@ -51,7 +51,7 @@ class Local:
 
 
 @value
-class Global:
+class InterfaceName:
     """Another definition, through its interface."""
 
     target: DefinitionTarget
@@ -59,27 +59,27 @@ class Global:
 
 
 @value
-class Member:
+class RecursiveName:
     """A definition of the group that is inferred right now: recursion."""
 
     target: DefinitionTarget
 
 
 @value
-class Builtin:
+class BuiltinName:
     """A builtin, a constant or one of the special forms."""
 
     name: str
 
 
 @value
-class Module:
+class ModuleName:
     """A module's name, which is not a value."""
 
     name: str
 
 
-Meaning = Local | Global | Member | Builtin | Module
+Meaning = Local | InterfaceName | RecursiveName | BuiltinName | ModuleName
 
 
 @dataclass
@@ -102,8 +102,8 @@ class Outside:
 
 
 @cache
-def _builtin(name: str) -> Builtin:
-    return Builtin(name)
+def _builtin(name: str) -> BuiltinName:
+    return BuiltinName(name)
 
 
 def builtin_names() -> tuple[str, ...]:
@@ -191,7 +191,7 @@ def undefined_member(outside: Outside, scope: Scope, node: nodes.Member) -> Diag
             help=did_you_mean([f"{node.path}.{name}" for name in near]), suggestions=instead(node.name_span, near),
         )  # fmt: skip
     bound = None if local else (meaning(db, file, node.path) or meaning(db, file, head))
-    if isinstance(bound, Defined):
+    if isinstance(bound, DefinitionBinding):
         return _no_module(node, f"`{head}` is a definition, not a module")
     if bound is not None:
         return None
@@ -264,4 +264,4 @@ def names_at_top(db: Database, top: str) -> tuple[str, ...]:
     return tuple(found)
 
 
-quick(Global, Member, Builtin, Module)
+quick(InterfaceName, RecursiveName, BuiltinName, ModuleName)

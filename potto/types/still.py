@@ -16,7 +16,7 @@ from potto.syntax.written import without_parentheses
 from potto.types.context import Inference
 from potto.types.mismatches import needs_deriv
 from potto.types.motionless import head_of
-from potto.types.scope import Builtin, Global, Local, Meaning
+from potto.types.scope import BuiltinName, InterfaceName, Local, Meaning
 from potto.types.types import (
     REAL,
     UNKNOWN,
@@ -147,12 +147,12 @@ def _of_a_definition(inference: Inference, head: nodes.Expr) -> bool:
     if isinstance(head, nodes.Apply):
         inner = without_parentheses(head.arguments[0].value) if len(head.arguments) == 1 else head
         meaning = _meaning(inference, head.function)
-        derives = isinstance(meaning, Builtin) and meaning.name == "deriv"
-        return derives and isinstance(_meaning(inference, inner), Global)
+        derives = isinstance(meaning, BuiltinName) and meaning.name == "deriv"
+        return derives and isinstance(_meaning(inference, inner), InterfaceName)
     meaning = _meaning(inference, head)
     if isinstance(meaning, Local):
         return meaning.kind == "local" and meaning.value is not None and _of_a_definition(inference, meaning.value)
-    return isinstance(meaning, Global) and meaning.interface.derivative
+    return isinstance(meaning, InterfaceName) and meaning.interface.derivative
 
 
 def _meaning(inference: Inference, expr: nodes.Expr) -> Meaning | None:
@@ -180,12 +180,12 @@ def _evident(inference: Inference, expr: nodes.Expr) -> bool:
             meaning = _meaning(inference, expr)
             if isinstance(meaning, Local):
                 return id(meaning) in inference.heads or _is_bound(inference, meaning)
-            return isinstance(meaning, Global | Builtin)
+            return isinstance(meaning, InterfaceName | BuiltinName)
         case nodes.Member():
             owner = inference.owners.get(id(expr), _meaning(inference, expr))
-            return isinstance(owner, Global) or (isinstance(owner, Local) and id(owner) in inference.heads)
+            return isinstance(owner, InterfaceName) or (isinstance(owner, Local) and id(owner) in inference.heads)
         case nodes.Apply(function=function):
-            return isinstance(_meaning(inference, function), Global)
+            return isinstance(_meaning(inference, function), InterfaceName)
         case nodes.Field(value=inner) | nodes.With(record=inner) | nodes.Index(array=inner):
             return _evident(inference, inner)
         case _:

@@ -126,7 +126,7 @@ class Truth:
 
 
 @value
-class Var:
+class TypeVariable:
     """A type variable of a finished type: any type, the same wherever the name stands."""
 
     name: str
@@ -150,7 +150,7 @@ class Meta:
 
 
 Size = Count | SizeVar | Shifted | AnySize
-Type = Real | Dist | TupleOf | ArrayOf | Size | Function | Diffeo | Truth | Var | Unknown | Meta
+Type = Real | Dist | TupleOf | ArrayOf | Size | Function | Diffeo | Truth | TypeVariable | Unknown | Meta
 
 REAL = Real()
 TRUTH = Truth()
@@ -318,7 +318,7 @@ def _derivative(type: Type, parameters: frozenset[str]) -> Type:
             return Function(duals, _derivative(result, inner))
         case Diffeo(dims):
             return UNKNOWN if dims is None else dual_of_tuple((TupleOf((REAL, REAL), dual=True),) * dims)
-        case Var():  # a number, for want of better knowledge
+        case TypeVariable():  # a number, for want of better knowledge
             return TupleOf((Real(star=True), Real(star=True)), dual=True)
         case Truth() | Unknown() | Meta() | Count() | SizeVar() | Shifted() | AnySize():
             return UNKNOWN
@@ -340,6 +340,6 @@ quick(
     Function,
     Diffeo,
     Truth,
-    Var,
+    TypeVariable,
     Unknown,
 )

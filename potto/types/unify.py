@@ -25,8 +25,8 @@ from potto.types.types import (
     Truth,
     TupleOf,
     Type,
+    TypeVariable,
     Unknown,
-    Var,
     groups_of,
     resolve,
     shifted,
@@ -60,7 +60,7 @@ def unify(a: Type, b: Type) -> bool:
         return unify(a.size, b.size) and fits
     if isinstance(a, SIZES) and isinstance(b, SIZES):
         return _unify_sizes(a, b)
-    if isinstance(a, Var) and isinstance(b, Var):
+    if isinstance(a, TypeVariable) and isinstance(b, TypeVariable):
         return a.name == b.name
     return isinstance(a, Truth) and isinstance(b, Truth)
 
@@ -236,7 +236,7 @@ def open_type(type: Type, level: int) -> Type:
     def leaf(part: Type) -> Type:
         if isinstance(part, NUMBERS):
             return REAL
-        if isinstance(part, Var):
+        if isinstance(part, TypeVariable):
             return fresh.setdefault(part.name, Meta(level))
         if isinstance(part, SizeVar):
             return fresh.setdefault(f"[{part.name}]", Meta(level, size=part.name))
@@ -258,7 +258,7 @@ def close_type(type: Type) -> Type:
             if not sizes:
                 sizes.update(p.name for group in groups_of(type) for p in group if p.name is not None)
             names[part] = SizeVar(size_name(part.size, sizes))
-        return names.setdefault(part, Var(_variable_name(len(names))))
+        return names.setdefault(part, TypeVariable(_variable_name(len(names))))
 
     return rebuild(type, leaf)
 

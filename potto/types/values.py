@@ -1,12 +1,12 @@
 """What a value depends on: abstract values with the shape of a type and, at each number, where it comes from.
 
-Owns `Value` and its algebra. A `Source` is a variable of integration or an input of a function. A `Closure` is a
-function that is known: symbolic inputs, its result in terms of them, and effects: what it demands of them (`Sink`) and
-what it passes to the functions among them (`Port`). An `Abstract` is a function that is an input itself: it has ports
-for what it is given and a symbolic result. It is assumed that what an unknown function gives varies with all that it is
-given; so every call is judged by itself, and a function can be judged without its callers.
+Owns `Value` and its algebra. A `Source` is a variable of integration or an input of a function. An `AbstractFunction`
+is a function that is known: symbolic inputs, its result in terms of them, and effects: what it demands of them (`Sink`)
+and what it passes to the functions among them (`Port`). An `Abstract` is a function that is an input itself: it has
+ports for what it is given and a symbolic result. It is assumed that what an unknown function gives varies with all that
+it is given; so every call is judged by itself, and a function can be judged without its callers.
 
-An interface is a `Closure` whose sources are interned by number, so that equal interfaces are equal values.
+An interface is an `AbstractFunction` whose sources are interned by number, so that equal interfaces are equal values.
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ class Spike:
 
 
 @value
-class Scalar:
+class AbstractScalar:
     """A number, a truth value or anything whose inside is not known.
 
     `carriers`: sources of unknown type that it may be itself (the rest only decides which). `jumps`: the surfaces
@@ -144,7 +144,7 @@ class Effect:
 
 
 @value
-class Closure:
+class AbstractFunction:
     inputs: tuple[Value, ...]
     result: Value
     effects: tuple[Effect, ...] = ()
@@ -166,25 +166,25 @@ class Choice:
     options: tuple[Value, ...]
 
 
-Value = Scalar | TupleValue | ListValue | Closure | Abstract | Choice
+Value = AbstractScalar | TupleValue | ListValue | AbstractFunction | Abstract | Choice
 
 NONE: Sources = {}
-STILL = Scalar(NONE)
+STILL = AbstractScalar(NONE)
 HAZE = Source("other", "?")
-HAZY = Scalar({HAZE: None})  # what is wrong: varies with it knows what, and breaks no rule
+HAZY = AbstractScalar({HAZE: None})  # what is wrong: varies with it knows what, and breaks no rule
 
 
 quick(
     Step,
     Joined,
     Spike,
-    Scalar,
+    AbstractScalar,
     TupleValue,
     ListValue,
     PortTuple,
     PortFunction,
     Effect,
-    Closure,
+    AbstractFunction,
     Choice,
     NoPort,
     Abstract,

@@ -13,7 +13,7 @@ from potto.modules.hints import known_elsewhere
 from potto.source import Span
 from potto.syntax import nodes
 from potto.types import kinds
-from potto.types.context import Inference, Part
+from potto.types.context import Inference, NamedPart
 from potto.types.format import format_type, format_types
 from potto.types.lookups import image, interp
 from potto.types.mismatches import array_fields, describe, no_field
@@ -149,7 +149,7 @@ def field(inference: Inference, type: Type, name: str, node: nodes.Member | node
     place = place_in(found, name)
     if isinstance(found, TupleOf) and place is not None and place < len(found.items):
         inference.fields.setdefault(id(node), []).append(place)
-        inference.parts.append(Part(span, name, found, found.items[place]))
+        inference.parts.append(NamedPart(span, name, found, found.items[place]))
         return found.items[place]
     owner = node.path if isinstance(node, nodes.Member) else getattr(node.value, "id", "")
     inference.report(_no_part(inference, found, name, span, place, owner if owner.isidentifier() else "u"))

@@ -1,6 +1,6 @@
 """Parts of a reply as text for a screen or a pipe.
 
-Owns `painted` and `Look`. What a screen cannot show is written in another way: symbols in ASCII, images as text.
+Owns `painted` and `Screen`. What a screen cannot show is written in another way: symbols in ASCII, images as text.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from potto_repl.symbols import ascii_only
 DIM, OFF = "\x1b[2m", "\x1b[0m"
 
 
-class Look(Struct, frozen=True):
+class Screen(Struct, frozen=True):
     """What the screen can do.
 
     answers: whether an answer says under which name it stays at hand. breaks: whether prose is broken to its width.
@@ -34,7 +34,7 @@ class Look(Struct, frozen=True):
         return COLORS if self.color else PLAIN
 
 
-def painted(part: Part, look: Look) -> str:
+def painted(part: Part, look: Screen) -> str:
     """A part as it is written, without a final newline."""
     columns = look.width if look.breaks else None
     text = _picture(part, look) if part.kind == "picture" else part.shown(look.palette, columns)
@@ -46,7 +46,7 @@ def painted(part: Part, look: Look) -> str:
     return f"{DIM}{text}{OFF}" if look.color and part.kind in ("tail", "note") else text
 
 
-def _picture(part: Part, look: Look) -> str:
+def _picture(part: Part, look: Screen) -> str:
     data = part.data or {}
     picture = data.get("_picture")
     if isinstance(picture, Plot):

@@ -29,7 +29,7 @@ class Recorded(Struct, frozen=True):
     answer: str
 
 
-class Difference(Struct, frozen=True):
+class ChangedAnswer(Struct, frozen=True):
     """An entry whose answer is another one now."""
 
     entry: Recorded
@@ -55,7 +55,7 @@ def recorded(text: str) -> Iterator[Recorded]:
             answer.append(line)
 
 
-def replayed(text: str) -> Iterator[tuple[Recorded, Difference | None]]:
+def replayed(text: str) -> Iterator[tuple[Recorded, ChangedAnswer | None]]:
     """Enter each entry of a record again in a new session, and give what is different now."""
     from potto_repl.respond import respond
     from potto_repl.session import Conversation
@@ -66,7 +66,7 @@ def replayed(text: str) -> Iterator[tuple[Recorded, Difference | None]]:
         if re.match(r":(record|rec|quit|q|edit|save|watch)\b", entry.text):
             continue  # it concerns files and terminals, not answers
         now = respond(session, readable(entry.text)).text
-        yield entry, None if not entry.answer or same(entry.answer, now) else Difference(entry, now)
+        yield entry, None if not entry.answer or same(entry.answer, now) else ChangedAnswer(entry, now)
 
 
 def same(before: str, now: str) -> bool:

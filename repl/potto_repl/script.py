@@ -12,13 +12,13 @@ import re
 from collections.abc import Iterable, Iterator
 from typing import TextIO
 
-from potto_repl.paint import Look, painted
+from potto_repl.paint import Screen, painted
 from potto_repl.reply import Part
 from potto_repl.respond import stream
 from potto_repl.session import Conversation
 from potto_repl.symbols import readable
 
-PIPE = Look(answers=False)
+PIPE = Screen(answers=False)
 _ALONE = re.compile(r":|\S+\?{1,2}\s*$")
 
 
@@ -51,8 +51,8 @@ def _joined(lines: list[str]) -> str:
 
 
 def run(
-    session: Conversation, texts: Iterable[str], out: TextIO, err: TextIO, *, look: Look = PIPE, complain: Look = PIPE,
-    as_json: bool = False, keep_going: bool = False, load: str | None = None,
+    session: Conversation, texts: Iterable[str], out: TextIO, err: TextIO, *, look: Screen = PIPE,
+    complain: Screen = PIPE, as_json: bool = False, keep_going: bool = False, load: str | None = None,
 ) -> int:  # fmt: skip
     """Answer entries one by one and return the exit status. A file that is loaded first only reports what is wrong with
     it."""

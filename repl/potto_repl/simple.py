@@ -48,11 +48,11 @@ class Simple:
     def answer(self, text: str) -> None:
         try:
             session = self.loader.session  # waited for, so that only one thread imports what it needs
-            from potto_repl.paint import Look, painted
+            from potto_repl.paint import Screen, painted
             from potto_repl.respond import stream
             from potto_repl.symbols import readable
 
-            look = Look(unicode=self.unicode, width=shutil.get_terminal_size().columns, breaks=True)
+            look = Screen(unicode=self.unicode, width=shutil.get_terminal_size().columns, breaks=True)
             for part in stream(session, readable(text)):
                 say(painted(part, look))
         except KeyboardInterrupt:

@@ -171,13 +171,13 @@ class Terminal:
 
     def show(self, part: Any) -> None:
         from potto_repl.drawing import protocol
-        from potto_repl.paint import Look, painted
+        from potto_repl.paint import Screen, painted
 
         session = self.loader.session
         if part.kind == "tail" and not session.options.details:
             return
         color = self.color and session.options.theme != "none"
-        look = Look(color, self.unicode and session.options.unicode, self.columns(), protocol(), breaks=True)
+        look = Screen(color, self.unicode and session.options.unicode, self.columns(), protocol(), breaks=True)
         self.say(painted(part, look))
 
     def say(self, text: str) -> None:

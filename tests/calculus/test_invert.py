@@ -10,7 +10,7 @@ import pytest
 from calculus_terms import term, value
 
 from potto.calculus.algebra.affine import affine, determinant, solve_affine
-from potto.calculus.solving.inverse_map import Failure, Inverse, invert, jacobian
+from potto.calculus.solving.inverse_map import Failure, InverseMap, invert, jacobian
 from potto.core.terms import Term, substitute, var
 from potto.diffeos import FAMILIES, DiffeoFamily
 
@@ -51,7 +51,7 @@ def test_the_inverse_of_a_family_leads_back(family: DiffeoFamily) -> None:
 def test_a_family_is_inverted_without_being_told(family: DiffeoFamily) -> None:
     xs, _ = names(family)
     found = invert(forward(family), xs)
-    assert isinstance(found, Inverse), found
+    assert isinstance(found, InverseMap), found
     for env in points(family):
         image = dict(zip(found.values, numbers(forward(family), env), strict=True))
         solutions = [numbers(b, {**env, **image}) for b in found.branches]
@@ -63,7 +63,7 @@ def test_a_family_is_inverted_without_being_told(family: DiffeoFamily) -> None:
 def test_the_determinant_agrees_with_differences(family: DiffeoFamily) -> None:
     xs, _ = names(family)
     found = invert(forward(family), xs)
-    assert isinstance(found, Inverse)
+    assert isinstance(found, InverseMap)
     h = mpmath.mpf(10) ** -10
     for env in points(family, 5):
         with mpmath.workdps(40):
@@ -109,7 +109,7 @@ MAPS = [
 def test_maps_are_inverted(text: str, variables: str) -> None:
     coordinates = tuple(term(part) for part in text.split(";"))
     found = invert(coordinates, tuple(variables))
-    assert isinstance(found, Inverse), found
+    assert isinstance(found, InverseMap), found
     source = random.Random(text)
     free = sorted({n for c in coordinates for n in c.free})
     for _ in range(10):
@@ -141,7 +141,7 @@ def test_what_repeats_needs_a_branch() -> None:
     found = invert((term("sin(x)"), term("y")), ("x", "y"))
     assert isinstance(found, Failure) and not found.singular
     assert "periodic" in found.reason
-    assert isinstance(invert((term("sin(x)"), term("y")), ("x", "y"), selected=True), Inverse)
+    assert isinstance(invert((term("sin(x)"), term("y")), ("x", "y"), selected=True), InverseMap)
 
 
 @pytest.mark.parametrize("size", [1, 2, 3, 4, 5, 6])
@@ -178,7 +178,7 @@ def test_the_determinant_of_a_rotation_is_one() -> None:
 
 def test_branches_of_a_fold_meet_where_the_determinant_vanishes() -> None:
     found = invert((term("x^2"), term("y")), ("x", "y"))
-    assert isinstance(found, Inverse) and len(found.branches) == 2
+    assert isinstance(found, InverseMap) and len(found.branches) == 2
     at_fold = [numbers(b, {"u": 0.0, "v": 1.0}) for b in found.branches]
     assert at_fold[0] == at_fold[1] == [0.0, 1.0]
     assert numbers((substitute(found.determinant, {"x": term("0")}),), {}) == [0.0]

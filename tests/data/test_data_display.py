@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from potto.data import Array, Item, Number, Row, Table, summary, thumbnail
+from potto.data import Array, Item, Number, NumberRow, Table, summary, thumbnail
 
 
 def of(values: object, item: Item | None = None) -> Array:
@@ -30,7 +30,7 @@ def of(values: object, item: Item | None = None) -> Array:
         (of(range(8)), "[8] from 0 to 7, mean 3.5 ▁▂▃▄▅▆▇█"),
         (of([[1, 1], [1, 1]]), "[2, 2] all 1 ▁▁▁▁"),
         (of(np.arange(48)), "[48] from 0 to 47, mean 23.5 ▁▁▁▂▂▂▃▃▃▄▄▄▅▅▅▆▆▆▇▇▇███"),
-        (of([[0, 0, 0], [1, 1, 1]], Row(3)), "[2] of rows of 3 from 0 to 1, mean 0.5 ▁█"),
+        (of([[0, 0, 0], [1, 1, 1]], NumberRow(3)), "[2] of rows of 3 from 0 to 1, mean 0.5 ▁█"),
         (of([1e308, 1.5e308, -1e308]), "[3] from -1e+308 to 1.5e+308, mean 5e+307 ▇█▁"),
         (Table((("x", of([1, 2])), ("n", 3.0))), "x [2] from 1 to 2, mean 1.5 ▁█; n 3"),
         (Table(tuple((name, 1.0) for name in "abcdef")), "a 1; b 1; c 1; d 1; and 2 more"),
@@ -65,7 +65,7 @@ def pixels(png: bytes | None) -> np.ndarray:
 def test_thumbnails_keep_their_proportions() -> None:
     assert pixels(thumbnail(of(np.ones((100, 1000))))).shape == (6, 64, 1)
     assert pixels(thumbnail(of(np.ones((1000, 3))))).shape == (64, 1, 1)
-    assert pixels(thumbnail(of(np.zeros((65, 65, 3)), Row(3)))).shape == (64, 64, 3)
+    assert pixels(thumbnail(of(np.zeros((65, 65, 3)), NumberRow(3)))).shape == (64, 64, 3)
     assert pixels(thumbnail(of(np.ones((2, 3))))).tolist() == [[[255]] * 3] * 2
 
 
@@ -81,5 +81,5 @@ def test_other_numbers_are_shown_from_the_least_to_the_greatest() -> None:
 
 
 def test_what_is_no_picture_has_no_thumbnail() -> None:
-    for value in (1.0, of([1, 2]), of(np.ones((2, 2, 2))), of(np.ones((2, 2, 4)), Row(4)), Table((("x", 1.0),))):
+    for value in (1.0, of([1, 2]), of(np.ones((2, 2, 2))), of(np.ones((2, 2, 4)), NumberRow(4)), Table((("x", 1.0),))):
         assert thumbnail(value) is None

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from potto.data import Table, shape_of, values_of
 from potto.data.lists import nested
-from potto.data.mistakes import Refused
+from potto.data.mistakes import DataRefused
 from potto.data.values import Array
 
 reals = st.floats(allow_nan=False, allow_infinity=False)
@@ -153,6 +153,6 @@ def test_numbers_are_those_that_python_reads(text: str) -> None:
 
 
 def test_a_name_that_is_given_twice_is_told_among_many() -> None:
-    with pytest.raises(Refused) as refused:
+    with pytest.raises(DataRefused) as refused:
         nested('[{"x": 1}, {"x": 1, "x": 2}]')
     assert "twice" in refused.value.mistake.message

@@ -17,7 +17,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from potto.data import Array, DataMistake, Number, Row, Sizes, shape, shape_of, thumbnail, values_of
+from potto.data import Array, DataMistake, Number, NumberRow, Sizes, shape, shape_of, thumbnail, values_of
 from potto.data.files import MEMORY
 from potto.extras import install_command
 
@@ -51,7 +51,7 @@ def test_grey_of_sixteen_bits(pixels: npt.NDArray[np.uint16]) -> None:
 @given(sides.flatmap(lambda side: hnp.arrays(np.uint8, (*side, 3))))
 def test_colours(pixels: npt.NDArray[np.uint8]) -> None:
     assert np.array_equal(light(written(pixels)), pixels / 255)
-    assert shape_of(Path("p.PNG"), written(pixels)) == Sizes(pixels.shape[:2], Row(3))
+    assert shape_of(Path("p.PNG"), written(pixels)) == Sizes(pixels.shape[:2], NumberRow(3))
 
 
 @given(sides.flatmap(lambda side: hnp.arrays(np.uint8, (*side, 4))))
@@ -73,7 +73,7 @@ def test_palettes_and_bits() -> None:
     assert bits[24] == 1 and np.array_equal(light(bits), pixels[..., 0] / 255)
 
 
-@pytest.mark.parametrize(("shape", "item"), [((7, 9), Number()), ((7, 9, 3), Row(3))])
+@pytest.mark.parametrize(("shape", "item"), [((7, 9), Number()), ((7, 9, 3), NumberRow(3))])
 @pytest.mark.parametrize("how", [{}, {"progressive": True}, {"comment": b"x" * 300}])
 def test_jpeg(shape: tuple[int, ...], item: object, how: dict[str, Any]) -> None:
     content = written(np.full(shape, 200, np.uint8), "JPEG", quality=95, **how)
@@ -83,7 +83,7 @@ def test_jpeg(shape: tuple[int, ...], item: object, how: dict[str, Any]) -> None
 
 def test_jpeg_for_printing() -> None:
     content = written(np.full((4, 4, 3), 250, np.uint8), "JPEG", mode="CMYK")
-    assert shape_of(Path("p.jpg"), content) == Sizes((4, 4), Row(3))
+    assert shape_of(Path("p.jpg"), content) == Sizes((4, 4), NumberRow(3))
     assert np.allclose(light(content, "p.jpg"), 250 / 255, rtol=0, atol=0.02)
 
 

@@ -203,6 +203,6 @@ def test_only_whole_calls_of_definitions_are_points() -> None:
     f = fixture("def f(a)(b) a*b\ny = 1\n")
     for text in ("f(1)", "sin(1)", "y", "f(1)(2)(3)", "f(1, 2)(3)", "f(", "nowhere(1)"):
         assert ide.point_of(f.db, f.file, text) is None, text
-    assert ide.point_of(f.db, f.file, "(f(1)(b=2))") == ide.Point(
+    assert ide.point_of(f.db, f.file, "(f(1)(b=2))") == ide.CallPoint(
         "f(1)(2)", (("a", "deriv(f)((1, 1))(2)"), ("b", "deriv(f)(1)((2, 1))"))
     )

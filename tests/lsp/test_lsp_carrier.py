@@ -9,7 +9,7 @@ from concurrent.futures import Future
 from typing import Any
 
 import pytest
-from potto_lsp.carrier import Carrier, Protocol, settle
+from potto_lsp.carrier import Protocol, StreamServer, settle
 from potto_lsp.errors import RequestError
 
 LAZILY = """
@@ -50,7 +50,7 @@ class Written:
         """Nothing to do."""
 
 
-class Always(Carrier):
+class Always(StreamServer):
     """A server that takes everything at any time."""
 
     def refused(self, method: str) -> RequestError | None:

@@ -18,7 +18,7 @@ from urllib.parse import unquote, urlparse
 import pytest
 from lsp_client import Client
 from potto_lsp.analysis import Analysis
-from potto_lsp.evaluation import LIVE, Evaluator, Task
+from potto_lsp.evaluation import LIVE, EvaluationTask, Evaluator
 from potto_lsp.evaluator import _answer as answered
 
 from potto.evaluating.world import World
@@ -356,7 +356,7 @@ def test_nothing_is_evaluated_unasked_when_that_is_switched_off(server: Server, 
 def ask(evaluator: Evaluator, text: str, **more: Any) -> Any:
     """What an evaluator answers."""
     answers: SimpleQueue[Any] = SimpleQueue()
-    evaluator.put(Task("evaluate", "<text>", text, answers.put, **more))
+    evaluator.put(EvaluationTask("evaluate", "<text>", text, answers.put, **more))
     answer = answers.get(timeout=60)
     return {"text": answer["result"]["text"]} if "result" in answer else answer
 
@@ -375,7 +375,7 @@ def kill_at_work(evaluator: Evaluator, monkeypatch: pytest.MonkeyPatch, times: i
     """End the process of an evaluator when it has been asked something, and then those that follow; their ids."""
     waits, killed = evaluator._await, list[int]()
 
-    def kill(id: int, task: Task) -> Any:
+    def kill(id: int, task: EvaluationTask) -> Any:
         process = evaluator._process
         if process is not None and len(killed) < times:
             killed.append(process.pid)
@@ -438,7 +438,9 @@ def test_what_a_user_asks_for_does_not_wait_for_what_is_shown() -> None:
     assert ask(evaluator, "1 + 1") == {"text": "2"}
     done: list[str] = []
     ended = Event()
-    evaluator.put(Task("evaluate", "<text>", HEAVY, lambda a: (done.append("shown"), ended.set()), urgency=LIVE))
+    evaluator.put(
+        EvaluationTask("evaluate", "<text>", HEAVY, lambda a: (done.append("shown"), ended.set()), urgency=LIVE)
+    )
     time.sleep(0.1)
     assert ask(evaluator, "2 + 3") == {"text": "5"} and done == []
     assert ended.wait(60) and done == ["shown"]

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from potto_lsp.analysis import Analysis
 from potto_lsp.documents import Document
-from potto_lsp.text import Text
+from potto_lsp.text import DocumentText
 from potto_lsp.uris import to_uri
 
 from potto.crew import crew
@@ -34,7 +34,7 @@ def session(folder: Path) -> Analysis:
     """An analysis of a folder in which the last module is open, and edited."""
     made = Analysis("utf-16")
     made.set_folders([to_uri(str(folder))])
-    made.put(Document(to_uri(str(folder / "m5.po")), "potto", 1, Text("def f(t, k)\n    t\n", "utf-16")))
+    made.put(Document(to_uri(str(folder / "m5.po")), "potto", 1, DocumentText("def f(t, k)\n    t\n", "utf-16")))
     return made
 
 

@@ -13,8 +13,8 @@ from potto_lsp.asking import Ask
 from potto_lsp.client import Client
 from potto_lsp.documents import Document
 from potto_lsp.features import FEATURES
-from potto_lsp.session import Session
-from potto_lsp.text import Text
+from potto_lsp.session import ClientSession
+from potto_lsp.text import DocumentText
 
 URI = "file:///nowhere/whole.po"
 DOCUMENT = {"textDocument": {"uri": URI}}
@@ -75,19 +75,21 @@ def terms(n: int) -> str:
 PROGRAMS = {each.__name__: each for each in (plain, calling, looked_at, shaded, script, constants, again, terms)}
 
 
-def session() -> Session:
-    made = Session(Client({"capabilities": CAPABILITIES}), lambda *_: None, lambda *_: None, lambda action: action())
+def session() -> ClientSession:
+    made = ClientSession(
+        Client({"capabilities": CAPABILITIES}), lambda *_: None, lambda *_: None, lambda action: action()
+    )
     made.load()
     return made
 
 
-def put(session: Session, text: str, version: int = 1) -> Text:
-    document = Document(URI, "potto", version, Text(text))
+def put(session: ClientSession, text: str, version: int = 1) -> DocumentText:
+    document = Document(URI, "potto", version, DocumentText(text))
     session.analysis.put(document)
     return document.text
 
 
-def ask(session: Session, method: str, text: Text) -> Any:
+def ask(session: ClientSession, method: str, text: DocumentText) -> Any:
     whole = {"start": {"line": 0, "character": 0}, "end": {"line": text.lines.count, "character": 0}}
     line, column = text.position(text.text.index("f") if "f" in text.text else 0)
     place = {"line": line, "character": column}
@@ -99,7 +101,7 @@ def ask(session: Session, method: str, text: Text) -> Any:
 
 
 @contextmanager
-def asked(program: Callable[[int], str], n: int) -> Iterator[tuple[Session, Text]]:
+def asked(program: Callable[[int], str], n: int) -> Iterator[tuple[ClientSession, DocumentText]]:
     made = session()
     text = put(made, program(n))
     made.analysis.diagnostics(made.analysis.put(Document(URI, "potto", 1, text)))

@@ -6,7 +6,7 @@ import random
 
 import pytest
 from how_many import examples
-from potto_lsp.text import ENCODINGS, Encoding, Text, line_starts
+from potto_lsp.text import ENCODINGS, DocumentText, Encoding, line_starts
 
 PIECES = ["a", "xyz", " ", "é", "ß", "中", "𝄞", "🙂", "\u2028", "\u2029", "\x0b", "\x0c", "\x1c", "\x85", "\n", "\r",
           "\r\n", "\n\n", "\ufeff", "\t"]  # fmt: skip
@@ -47,7 +47,7 @@ def check_edits(seed: int, edits: int) -> None:
     rng = random.Random(seed)
     encoding = rng.choice(ENCODINGS)
     expected = random_text(rng, 40)
-    text = Text(expected, encoding)
+    text = DocumentText(expected, encoding)
     for _ in range(edits):
         lines = len(reference_lines(expected))
         places = sorted((rng.randrange(lines + 1), rng.randrange(12)) for _ in range(2))
@@ -81,7 +81,7 @@ def test_lines_are_those_of_the_reference(seed: int) -> None:
     text = random_text(random.Random(seed), 200)
     lines = reference_lines(text)
     assert line_starts(text) == [sum(map(len, lines[:n])) for n in range(len(lines))]
-    assert [Text(text).line(n) for n in range(len(lines))] == [line.rstrip("\r\n") for line in lines]
+    assert [DocumentText(text).line(n) for n in range(len(lines))] == [line.rstrip("\r\n") for line in lines]
 
 
 @pytest.mark.parametrize(
@@ -97,12 +97,12 @@ def test_lines_are_those_of_the_reference(seed: int) -> None:
     ],
 )
 def test_positions_out_of_the_ordinary(text: str, line: int, column: int, offset: int) -> None:
-    assert Text(text).offset(line, column) == offset
+    assert DocumentText(text).offset(line, column) == offset
 
 
 def test_half_a_surrogate_pair_is_survived() -> None:
     for encoding in ENCODINGS:
-        text = Text("a\ud800b", encoding)
+        text = DocumentText("a\ud800b", encoding)
         assert text.position(3)[1] == {"utf-8": 5, "utf-16": 3, "utf-32": 3}[encoding]
 
 
@@ -111,7 +111,7 @@ def test_positions_in_a_very_long_line(encoding: Encoding) -> None:
     """Each is found without looking at the line: all of them together take no longer than to read it a few times."""
     text = "é𝄞ab" * 50_000 + "\r\n" + "x𝄞"
     units = {"utf-8": 8, "utf-16": 5, "utf-32": 4}[encoding]
-    found = Text(text, encoding)
+    found = DocumentText(text, encoding)
     for place in range(0, 200_000, 4):
         assert found.position(place) == (0, place // 4 * units)
     assert found.position(200_001) == found.position(200_000) == (0, 50_000 * units)

@@ -12,7 +12,7 @@ import pytest
 from lsp_client import Client
 from potto_lsp.analysis import Analysis
 from potto_lsp.documents import Document
-from potto_lsp.text import Text
+from potto_lsp.text import DocumentText
 from potto_lsp.uris import to_uri
 from potto_lsp.verdicts import FOLDER, Verdicts, program_digest
 
@@ -43,7 +43,7 @@ def session(folder: Path, text: str = MAIN) -> Analysis:
     made = Analysis("utf-16")
     made.set_folders([to_uri(str(folder))])
     uri = to_uri(str(folder / "main.po"))
-    made.put(Document(uri, "potto", 1, Text(text, "utf-16")))
+    made.put(Document(uri, "potto", 1, DocumentText(text, "utf-16")))
     return made
 
 

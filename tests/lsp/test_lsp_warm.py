@@ -11,7 +11,7 @@ from potto_lsp.analysis import Analysis
 from potto_lsp.client import Client
 from potto_lsp.documents import Document
 from potto_lsp.publishing import Publisher
-from potto_lsp.text import Text
+from potto_lsp.text import DocumentText
 
 USES, OTHERS = 3, 30
 LEAF = "def used(t, k) t*k\n\ndef alone(t) t\n"
@@ -43,7 +43,7 @@ class Session:
     def edit(self, name: str, text: str) -> None:
         self.version += 1
         uri = (self.folder / f"{name}.po").as_uri()
-        self.analysis.put(Document(uri, "potto", self.version, Text(text, "utf-16")))
+        self.analysis.put(Document(uri, "potto", self.version, DocumentText(text, "utf-16")))
 
     def check(self) -> None:
         for step in self.publisher.steps_again():

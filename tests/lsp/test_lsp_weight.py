@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 from lsp_client import EVERYTHING, Client
 from potto_lsp import memory
-from potto_lsp.progress import Progress
+from potto_lsp.progress import WorkProgress
 
 Server = Callable[..., Client]
 Uri = Callable[[str], str]
@@ -153,7 +153,7 @@ class Told:
 
 def test_no_progress_for_clients_that_show_none() -> None:
     session: Any = Told()
-    progress = Progress(session, "nothing")
+    progress = WorkProgress(session, "nothing")
     time.sleep(0.25)
     progress.report(1, 2)
     progress.end()

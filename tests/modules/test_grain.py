@@ -21,7 +21,7 @@ from potto.modules import (
     strongly_connected,
     syntax_diagnostics,
 )
-from potto.query import Database, Event
+from potto.query import Database, QueryEvent
 
 MAIN, LIB = key("main.po"), key("lib.po")
 PROGRAM = """
@@ -57,7 +57,7 @@ def ask_everything(db: Database) -> list[object]:
     return found
 
 
-def executed(events: list[Event], *queries: str) -> set[tuple[object, ...]]:
+def executed(events: list[QueryEvent], *queries: str) -> set[tuple[object, ...]]:
     return {(e.query, *e.args) for e in events if e.kind == "executed" and (not queries or e.query in queries)}
 
 

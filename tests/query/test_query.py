@@ -8,7 +8,7 @@ import time
 
 import pytest
 
-from potto.query import Cancelled, CycleError, Database, Event, query
+from potto.query import Cancelled, CycleError, Database, QueryEvent, query
 from potto.query.engine import SEGMENT
 
 
@@ -56,7 +56,7 @@ def guarded(db: Database, name: str) -> float:
         return -1.0
 
 
-def ran(events: list[Event], kind: str = "executed") -> list[str]:
+def ran(events: list[QueryEvent], kind: str = "executed") -> list[str]:
     return [event.query for event in events if event.kind == kind]
 
 
@@ -76,9 +76,9 @@ def test_a_memo_is_reused_and_an_edit_runs_what_it_concerns() -> None:
     with db.recording() as events:
         assert total(db, "a", "b") == 11
     assert [event for event in events if event.kind == "executed"] == [
-        Event("executed", "text", ("a",)),
-        Event("executed", "length", ("a",)),
-        Event("executed", "total", ("a", "b")),
+        QueryEvent("executed", "text", ("a",)),
+        QueryEvent("executed", "length", ("a",)),
+        QueryEvent("executed", "total", ("a", "b")),
     ]
 
 
@@ -287,7 +287,7 @@ def test_durable_memos_are_not_looked_at() -> None:
     put(db, "open", "xx")
     with db.recording() as events:
         total(db, "library")
-    assert events == [Event("reused", "total", ("library",))], "one step, however much is below"
+    assert events == [QueryEvent("reused", "total", ("library",))], "one step, however much is below"
     put(db, "library", "changed", durability=2)
     assert total(db, "library") == 7
 

@@ -10,7 +10,7 @@ import zlib
 
 import pytest
 from potto_repl.drawing import braille, half_blocks, inline, protocol, sixel
-from potto_repl.paint import Look, painted
+from potto_repl.paint import Screen, painted
 
 from potto.applications.pictures import Curve, Image, Plot, image_of
 
@@ -94,10 +94,10 @@ def test_holes_and_constants_are_drawn():
 
 def test_pictures_follow_the_screen(talk):
     part = talk(":image x*y 4").parts[0]
-    assert "\x1b" not in painted(part, Look()) and "\x1b[38;2;" in painted(part, Look(color=True))
-    assert painted(part, Look(color=True, images="kitty")).startswith("\x1b_G")
+    assert "\x1b" not in painted(part, Screen()) and "\x1b[38;2;" in painted(part, Screen(color=True))
+    assert painted(part, Screen(color=True, images="kitty")).startswith("\x1b_G")
     plot = talk(":plot u^2").parts[0]
-    assert max(map(len, painted(plot, Look(width=40)).splitlines())) <= 40
+    assert max(map(len, painted(plot, Screen(width=40)).splitlines())) <= 40
 
 
 def test_what_to_set_is_said_as_the_prompt_takes_it(talk):

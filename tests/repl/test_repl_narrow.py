@@ -6,7 +6,7 @@ import os
 import re
 
 import pytest
-from potto_repl.paint import Look, painted
+from potto_repl.paint import Screen, painted
 from potto_repl.registry import COMMANDS
 from potto_repl.start import greeting
 from potto_repl.terminal import Terminal
@@ -18,7 +18,7 @@ RULE = "def g(t) integral [0, 1] (if x < t then 1 else 0) d(x)"
 
 
 def lines(reply, columns, **look):
-    shown = "\n".join(painted(part, Look(width=columns, breaks=True, **look)) for part in reply.parts)
+    shown = "\n".join(painted(part, Screen(width=columns, breaks=True, **look)) for part in reply.parts)
     return shown.split("\n")
 
 
@@ -80,7 +80,7 @@ def test_carets_stand_under_what_is_meant_where_the_line_is_cut(talk):
 def test_wide_screens_and_pipes_are_as_before(talk):
     reply = talk(RULE)
     assert "\n".join(lines(reply, 200)) == reply.text
-    assert painted(reply.parts[0], Look(width=20)) == reply.parts[0].plain()
+    assert painted(reply.parts[0], Screen(width=20)) == reply.parts[0].plain()
 
 
 def test_prose_is_broken_between_words_and_not_in_code():

@@ -15,6 +15,7 @@ from potto.syntax.nodes import (
     Clause,
     Compare,
     Comprehension,
+    DeclaredInverse,
     Definition,
     DiffeoDefinition,
     DiffeoType,
@@ -32,7 +33,6 @@ from potto.syntax.nodes import (
     InlineDiffeo,
     Integral,
     Interval,
-    Inverse,
     Item,
     Lambda,
     Let,
@@ -249,7 +249,7 @@ def _definitions() -> st.SearchStrategy[Item]:
 
 def _diffeos() -> st.SearchStrategy[Item]:
     components = st.lists(expressions, min_size=2, max_size=3).map(tuple)
-    inverse = st.tuples(_parameters(types=False), components).map(lambda p: Inverse(O, *p))
+    inverse = st.tuples(_parameters(types=False), components).map(lambda p: DeclaredInverse(O, *p))
     variables = distinct_names.map(lambda found: tuple(Parameter(O, n) for n in found))
     where = st.lists(expressions, max_size=2).map(tuple)
     blocks = st.just(()) | _bindings(expressions)

@@ -18,7 +18,7 @@ from potto.types import (
     Real,
     TupleOf,
     Type,
-    Var,
+    TypeVariable,
     derivative_type,
     format_type,
     infer_expression,
@@ -178,7 +178,10 @@ PRINTED: list[tuple[Type, str]] = [
     (Function((Parameter(None, Real()),), Real()), "Real -> Real"),
     (Function((Parameter(None, TupleOf((Real(), Real()))),), Real()), "((Real, Real)) -> Real"),
     (Function((Parameter(None, Function((Parameter(None, Real()),), Real())),), Real()), "(Real -> Real) -> Real"),
-    (Function((Parameter("x", Var("q")), Parameter(None, Var("r"))), Var("q")), "(x: a, b) -> a"),
+    (
+        Function((Parameter("x", TypeVariable("q")), Parameter(None, TypeVariable("r"))), TypeVariable("q")),
+        "(x: a, b) -> a",
+    ),
     (Function((), Real()), "() -> Real"),
 ]
 

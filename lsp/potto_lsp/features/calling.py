@@ -42,7 +42,7 @@ def _item(ask: Ask, item: ide.CallItem) -> protocol.CallHierarchyItem:
     }
 
 
-def _ranges(ask: Ask, caller: str, call: ide.Call) -> list[protocol.Range]:
+def _ranges(ask: Ask, caller: str, call: ide.HierarchyCall) -> list[protocol.Range]:
     text = ask.analysis.text(caller)
     return [convert.range_of(text, span) for span in call.spans]
 

@@ -16,7 +16,7 @@ from potto.query import Database, query
 from potto_lsp.asking import Ask
 from potto_lsp.features import TOKEN_MODIFIERS, TOKEN_TYPES
 from potto_lsp.features.whole import lined
-from potto_lsp.text import Encoding, Text
+from potto_lsp.text import DocumentText, Encoding
 
 Numbers = tuple[int, tuple[int, ...]]  # the line of the last word, and five for each word
 
@@ -111,7 +111,7 @@ def _of_piece(db: Database, file: str, text: str, hidden: tuple[str, ...], encod
     """The words of a piece as numbers, as if it stood at the head of its file: those of its chunks, one behind the
     other."""
     found: list[int] = []
-    before, place = 0, Text(text, encoding)
+    before, place = 0, DocumentText(text, encoding)
     for chunk, name in PieceAt(file, 0, text, hidden).chunks(db):
         line = place.lines.line_of(chunk.start)
         if place.lines.start(line) != chunk.start:  # behind a byte order mark, or blanks
@@ -131,16 +131,16 @@ def _of_piece(db: Database, file: str, text: str, hidden: tuple[str, ...], encod
 @query
 def _of_definition(db: Database, file: str, name: str, encoding: Encoding) -> Numbers:
     """The words of a definition as numbers, as if it stood at the beginning of its file."""
-    return _numbers(Text(chunk_text(db, file, name) or "", encoding), definition_words(db, file, name))
+    return _numbers(DocumentText(chunk_text(db, file, name) or "", encoding), definition_words(db, file, name))
 
 
 @query(keep=8192)
 def _of_the_rest(db: Database, file: str, text: str, encoding: Encoding) -> Numbers:
     """Those of a chunk that defines nothing."""
-    return _numbers(Text(text, encoding), loose_words(db, file, text))
+    return _numbers(DocumentText(text, encoding), loose_words(db, file, text))
 
 
-def _numbers(text: Text, words: Iterable[Word], start: int = 0) -> Numbers:
+def _numbers(text: DocumentText, words: Iterable[Word], start: int = 0) -> Numbers:
     """Words as numbers, counted from `start` of a text."""
     found: list[int] = []
     before_line = before_column = 0

@@ -15,8 +15,8 @@ from potto.modules import names
 from potto_lsp import protocol
 from potto_lsp.asking import Ask
 from potto_lsp.deferred import Deferred
-from potto_lsp.errors import InvalidParams, Refusal, RequestError
-from potto_lsp.evaluation import Task
+from potto_lsp.errors import InvalidParams, RequestError, RequestRefused
+from potto_lsp.evaluation import EvaluationTask
 from potto_lsp.features.lenses import offers
 from potto_lsp.presenting import INFO
 from potto_lsp.progress import Working
@@ -45,13 +45,15 @@ def _evaluate(ask: Ask, file: str, arguments: list[Any]) -> Deferred:
     return _shown(ask, text, task(ask, "evaluate", file, text if point is None else point.text))
 
 
-def _point_of_name(ask: Ask, file: str, text: str) -> ide.Point | None:
+def _point_of_name(ask: Ask, file: str, text: str) -> ide.CallPoint | None:
     """The point at which a function is looked at, if the text is its name."""
     if text not in names(ask.db, file) or ide.kind_of(ask.db, file, text) != "function":
         return None
     for point in ide.points(ask.db, file, text):
         return point
-    raise Refusal(f"`{text}` is a function: evaluate a call of it, or write one as a live expression, `#> {text}(…)`")
+    raise RequestRefused(
+        f"`{text}` is a function: evaluate a call of it, or write one as a live expression, `#> {text}(…)`"
+    )
 
 
 def _differentiate(ask: Ask, file: str, arguments: list[Any]) -> Any:
@@ -62,14 +64,14 @@ def _differentiate(ask: Ask, file: str, arguments: list[Any]) -> Any:
     if text not in names(ask.db, file):
         point = ide.point_of(ask.db, file, text)
         if point is None:
-            raise Refusal(f"there is no definition of `{text}` in this file, and it is not a call of one")
+            raise RequestRefused(f"there is no definition of `{text}` in this file, and it is not a call of one")
         if not point.slopes:
-            raise Refusal(f"`{text}` does not give numbers for numbers, so it has no slopes")
+            raise RequestRefused(f"`{text}` does not give numbers for numbers, so it has no slopes")
         deferred = task(ask, "point", file, point.text, {"slopes": point.slopes}, _slopes(point))
         return _shown(ask, point.text, deferred)
     facts = derivative_facts(ask.db, file, text)
     if facts is None:
-        raise Refusal(f"`{text}` is not a function, so it has no derivative")
+        raise RequestRefused(f"`{text}` is not a function, so it has no derivative")
     inverse = ide.diffeo_markdown(ask.db, file, text)
     lines = [] if inverse is None else ["", *(f"  {line[2:]}" for line in inverse.replace("`", "").splitlines())]
     result = {"text": "\n".join([facts.text, *lines])}
@@ -77,7 +79,7 @@ def _differentiate(ask: Ask, file: str, arguments: list[Any]) -> Any:
     return result
 
 
-def _slopes(point: ide.Point) -> Callable[[Result], Result]:
+def _slopes(point: ide.CallPoint) -> Callable[[Result], Result]:
     """The value at a point and the slopes there, as lines to read."""
 
     def with_text(found: Result) -> Result:
@@ -99,7 +101,7 @@ def _preview(ask: Ask, file: str, arguments: list[Any]) -> Deferred:
     for parameter in functions:
         if not parameter.fits:
             needs = f"`{text}` needs a function `{parameter.name}` of the type {parameter.type}"
-            raise Refusal(f"{needs}: none was found in this file, in what it imports, or beside it")
+            raise RequestRefused(f"{needs}: none was found in this file, in what it imports, or beside it")
     axes = [p.name for p in scene.parameters if p.kind != "function"] if scene is not None else []
     more = {"box": box, "axes": axes, "given": {p.name: p.fits[0] for p in functions}}
     return _shown(ask, text, task(ask, "preview", file, text, more))
@@ -110,7 +112,7 @@ def _more(ask: Ask, file: str, arguments: list[Any]) -> Any:
     name = _text(arguments)
     found = list(offers(ask, file, name))
     if not found:
-        raise Refusal(f"there is no definition of `{name}` in this file")
+        raise RequestRefused(f"there is no definition of `{name}` in this file")
     if not ask.client.lists("experimental.commands.commands", "potto.more"):
         _choose(ask, name, [offer for offer in found if offer["command"] in _COMMANDS])
     return {"offers": found}
@@ -155,19 +157,19 @@ def task(
 ) -> Deferred:
     """What the evaluation process answers, once it does. `shape` turns that into the answer of the request. `quiet`:
     without progress."""
-    waiting: list[tuple[Task, Working | None]] = []
+    waiting: list[tuple[EvaluationTask, Working | None]] = []
 
     def start(finish: Callable[[Any | RequestError], None]) -> None:
         def done(answer: Result) -> None:
             if working is not None:
                 working.end()
-            finish(shape(answer["result"]) if "result" in answer else Refusal(str(answer["error"])))
+            finish(shape(answer["result"]) if "result" in answer else RequestRefused(str(answer["error"])))
 
         title = f"Potto: {text or os.path.basename(file)}"
         token = ask.optional("workDoneToken")
         token = token if isinstance(token, int | str) else None
         working = None if quiet else Working(ask.session, title, token, stop)
-        waiting.append((ask.session.evaluator.put(Task(do, file, text, done, more or {})), working))
+        waiting.append((ask.session.evaluator.put(EvaluationTask(do, file, text, done, more or {})), working))
 
     def stop() -> None:
         for each, working in waiting:

@@ -9,8 +9,8 @@ from potto.query import Database, query
 from potto.source import Span
 from potto_lsp import protocol
 from potto_lsp.asking import Ask
-from potto_lsp.features.whole import Part, part_of, whole
-from potto_lsp.text import Text
+from potto_lsp.features.whole import PieceItems, part_of, whole
+from potto_lsp.text import DocumentText
 from potto_lsp.wire import Encoded
 
 KINDS = {"comment": "comment", "imports": "imports", "region": "region"}
@@ -22,14 +22,14 @@ def folding_ranges(ask: Ask) -> Encoded:
 
 
 @query(keep=1024)
-def _part(db: Database, text: str, diffeo: bool) -> Part:
+def _part(db: Database, text: str, diffeo: bool) -> PieceItems:
     """The folds of a piece."""
-    place = Text(text)
+    place = DocumentText(text)
     found = [_lines(place, fold) for fold in piece_folds(db, text, diffeo)]
     return part_of(fold for fold in found if fold["endLine"] > fold["startLine"])
 
 
-def _lines(text: Text, fold: ide.Foldable) -> protocol.FoldingRange:
+def _lines(text: DocumentText, fold: ide.Foldable) -> protocol.FoldingRange:
     first, last = text.position(fold.span.start)[0], text.position(fold.span.end)[0]
     return {"startLine": first, "endLine": last, "kind": KINDS[fold.kind]}
 

@@ -8,8 +8,8 @@ from potto.modules import is_diffeo
 from potto.query import Database, query
 from potto_lsp import convert, protocol
 from potto_lsp.asking import Ask
-from potto_lsp.features.whole import Part, part_of, whole
-from potto_lsp.text import Encoding, Text
+from potto_lsp.features.whole import PieceItems, part_of, whole
+from potto_lsp.text import DocumentText, Encoding
 from potto_lsp.wire import Encoded
 
 
@@ -23,9 +23,9 @@ def document(ask: Ask) -> list[protocol.TextEdit] | Encoded:
 
 
 @query(keep=1024)
-def _part(db: Database, text: str, encoding: Encoding, diffeo: bool, first: bool, last: bool) -> Part:
+def _part(db: Database, text: str, encoding: Encoding, diffeo: bool, first: bool, last: bool) -> PieceItems:
     """The edits of a piece."""
-    return part_of(convert.text_edits(Text(text, encoding), piece_edits(db, text, diffeo, first, last)))
+    return part_of(convert.text_edits(DocumentText(text, encoding), piece_edits(db, text, diffeo, first, last)))
 
 
 def in_range(ask: Ask) -> list[protocol.TextEdit]:

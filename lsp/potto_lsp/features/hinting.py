@@ -11,8 +11,8 @@ from potto.query import Database, query
 from potto.source import Span
 from potto_lsp import convert, protocol
 from potto_lsp.asking import Ask
-from potto_lsp.features.whole import Part, lined, part_of
-from potto_lsp.text import Encoding, Text
+from potto_lsp.features.whole import PieceItems, lined, part_of
+from potto_lsp.text import DocumentText, Encoding
 from potto_lsp.wire import Encoded
 
 KINDS = {"type": 1, "parameter": 2}
@@ -28,19 +28,21 @@ def inlay_hints(ask: Ask) -> Encoded:
         elif at.start <= span.end and span.start <= at.start + len(at.text):
             hints = piece_hints(ask.db, ask.file, at.text, at.hidden)
             near = [hint for hint in hints if span.start <= at.start + hint.offset <= span.end and hint.kind not in off]
-            found.append(part_of(_hint(Text(at.text, text.encoding), hint) for hint in near).placed(line))
+            found.append(part_of(_hint(DocumentText(at.text, text.encoding), hint) for hint in near).placed(line))
     found.append(part_of(_live(ask, span)).placed(0))
     return Encoded(found)
 
 
 @query(keep=1024)
-def _part(db: Database, file: str, text: str, hidden: tuple[str, ...], encoding: Encoding, off: frozenset[str]) -> Part:
+def _part(
+    db: Database, file: str, text: str, hidden: tuple[str, ...], encoding: Encoding, off: frozenset[str]
+) -> PieceItems:
     """The hints of a piece."""
-    place, hints = Text(text, encoding), piece_hints(db, file, text, hidden)
+    place, hints = DocumentText(text, encoding), piece_hints(db, file, text, hidden)
     return part_of(_hint(place, hint) for hint in hints if hint.kind not in off)
 
 
-def _hint(text: Text, hint: ide.InlayHint) -> protocol.InlayHint:
+def _hint(text: DocumentText, hint: ide.InlayHint) -> protocol.InlayHint:
     found: protocol.InlayHint = {
         "position": convert.position(text, hint.offset),
         "label": hint.label,

@@ -13,8 +13,8 @@ from potto.source import Span
 from potto_lsp import convert, protocol
 from potto_lsp.asking import Ask
 from potto_lsp.errors import InvalidParams
-from potto_lsp.features.whole import Part, lined, part_of
-from potto_lsp.text import Encoding, Text
+from potto_lsp.features.whole import PieceItems, lined, part_of
+from potto_lsp.text import DocumentText, Encoding
 from potto_lsp.wire import Encoded
 
 COMMANDS = {
@@ -41,10 +41,10 @@ def code_lenses(ask: Ask) -> Encoded:
 @query(keep=1024)
 def _part(
     db: Database, file: str, text: str, hidden: tuple[str, ...], encoding: Encoding, uri: str, off: frozenset[str]
-) -> tuple[Part, bool]:
+) -> tuple[PieceItems, bool]:
     """The lenses of a piece, and whether one of them runs the script. The titles of values are looked up when they are
     shown."""
-    place, lenses = Text(text, encoding), piece_lenses(db, file, text, hidden)
+    place, lenses = DocumentText(text, encoding), piece_lenses(db, file, text, hidden)
     part = part_of(
         {"range": convert.range_of(place, lens.span), "data": [lens.command, *lens.arguments]}
         if lens.command == "value"

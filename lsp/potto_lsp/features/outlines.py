@@ -7,8 +7,8 @@ from potto.ide.navigation.outlines import piece_symbols
 from potto.query import Database, query
 from potto_lsp import convert, protocol
 from potto_lsp.asking import Ask
-from potto_lsp.features.whole import Part, part_of, whole
-from potto_lsp.text import Encoding, Text
+from potto_lsp.features.whole import PieceItems, part_of, whole
+from potto_lsp.text import DocumentText, Encoding
 from potto_lsp.wire import Encoded
 
 KINDS = {
@@ -24,18 +24,18 @@ def document_symbols(ask: Ask) -> Encoded:
 
 
 @query(keep=1024)
-def _part(db: Database, file: str, text: str, hidden: tuple[str, ...], uri: str, encoding: Encoding) -> Part:
+def _part(db: Database, file: str, text: str, hidden: tuple[str, ...], uri: str, encoding: Encoding) -> PieceItems:
     """Those of a piece: a list with places in the document of a URI, or a tree."""
-    found, place = piece_symbols(db, file, text, hidden), Text(text, encoding)
+    found, place = piece_symbols(db, file, text, hidden), DocumentText(text, encoding)
     return part_of(_flat(place, symbol, uri) if uri else _tree(place, symbol) for symbol in found)
 
 
-def _flat(text: Text, symbol: ide.DocumentSymbol, uri: str) -> protocol.SymbolInformation:
+def _flat(text: DocumentText, symbol: ide.DocumentSymbol, uri: str) -> protocol.SymbolInformation:
     place: protocol.Location = {"uri": uri, "range": convert.range_of(text, symbol.span)}
     return {"name": symbol.name, "kind": KINDS[symbol.kind], "location": place}
 
 
-def _tree(text: Text, symbol: ide.DocumentSymbol) -> protocol.DocumentSymbol:
+def _tree(text: DocumentText, symbol: ide.DocumentSymbol) -> protocol.DocumentSymbol:
     return {
         "name": symbol.name,
         "detail": symbol.detail,

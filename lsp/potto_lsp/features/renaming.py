@@ -8,25 +8,25 @@ from typing import Any
 from potto import ide
 from potto_lsp import convert, protocol
 from potto_lsp.asking import Ask
-from potto_lsp.errors import Refusal
+from potto_lsp.errors import RequestRefused
 from potto_lsp.uris import to_key
 
 
 def prepare(ask: Ask) -> dict[str, Any] | None:
     found = ide.prepare_rename(ask.db, ask.file, ask.offset)
     if isinstance(found, ide.Refused):
-        raise Refusal(found.message)
+        raise RequestRefused(found.message)
     return None if found is None else {"range": ask.range(found.span), "placeholder": found.placeholder}
 
 
 def rename(ask: Ask) -> protocol.WorkspaceEdit:
     found = ide.rename(ask.db, ask.file, ask.offset, ask.string("newName"))
     if isinstance(found, ide.Refused):
-        raise Refusal(found.message)
+        raise RequestRefused(found.message)
     edits = "workspace.workspaceEdit."
     moves = ask.client.can(edits + "documentChanges") and ask.client.lists(edits + "resourceOperations", "rename")
     if found.renames and not moves:
-        raise Refusal("this editor cannot be asked to rename a file, and a module is named by its file")
+        raise RequestRefused("this editor cannot be asked to rename a file, and a module is named by its file")
     return convert.workspace_edit(ask.analysis, ask.client, found)
 
 

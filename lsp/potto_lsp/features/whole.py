@@ -1,7 +1,7 @@
 """Answers about whole files, put together from pieces that are kept in the form in which they are sent.
 
-Owns `Part`, `part_of`, `whole` and `Pieces`. After a key all parts but one are the same; those below it are moved if
-lines were added or removed.
+Owns `PieceItems`, `part_of`, `whole` and `Pieces`. After a key all parts but one are the same; those below it are moved
+if lines were added or removed.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _LINES = re.compile(r'"(line|startLine|endLine)":(\d+)')
 """Lines in JSON. Not in its strings, where the quotes would be escaped."""
 
 
-class Part(Struct, eq=False):
+class PieceItems(Struct, eq=False):
     """The items of a piece as JSON with `%d` for each line, the line numbers relative to the piece, and the text for
     the line where it was last placed."""
 
@@ -38,11 +38,11 @@ class Part(Struct, eq=False):
         return self.text
 
 
-def part_of(items: Iterable[Any]) -> Part:
+def part_of(items: Iterable[Any]) -> PieceItems:
     """The part for the items of a piece, whose lines count from its first one."""
     text = json.dumps(list(items), separators=(",", ":"))[1:-1].replace("%", "%%")
     lines = tuple([int(found[2]) for found in _LINES.finditer(text)])
-    return Part(_LINES.sub(r'"\1":%d', text), lines)
+    return PieceItems(_LINES.sub(r'"\1":%d', text), lines)
 
 
 def lined(ask: Ask) -> Iterator[tuple[PieceAt, int]]:
@@ -52,7 +52,7 @@ def lined(ask: Ask) -> Iterator[tuple[PieceAt, int]]:
         yield at, text.lines.line_of(at.start)
 
 
-def whole(ask: Ask, part: Callable[[PieceAt], Part], beside: Iterable[Any] = ()) -> Encoded:
+def whole(ask: Ask, part: Callable[[PieceAt], PieceItems], beside: Iterable[Any] = ()) -> Encoded:
     """The items of all pieces, after those that belong to none."""
     found = [part_of(beside).placed(0)]
     found += [part(at).placed(line) for at, line in lined(ask)]

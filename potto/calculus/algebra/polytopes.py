@@ -1,8 +1,8 @@
 """Regions that affine conditions leave of a box, and proofs that nothing is left.
 
-Owns `Form`, `Forms` and `Region`. Coefficients may be terms in parameters. Each is carried with the number that it is
-now, so that a proof is searched for by numbers; what it rests on is a list of terms, its premises, and the proof holds
-for all parameters for which they are positive.
+Owns `AffineForm`, `Forms` and `Polytope`. Coefficients may be terms in parameters. Each is carried with the number that
+it is now, so that a proof is searched for by numbers; what it rests on is a list of terms, its premises, and the proof
+holds for all parameters for which they are positive.
 
 A conic combination of conditions f >= 0 and g >= 0 in which one variable cancels has to be somewhere positive in the
 box; where it is not, no point meets both (Farkas). In one variable that is all there is to say.
@@ -49,7 +49,7 @@ class Coefficient(Struct, frozen=True):
 NONE = Coefficient(ZERO, 0.0)
 
 
-class Form(Struct, frozen=True, eq=False):
+class AffineForm(Struct, frozen=True, eq=False):
     """rest + sum of slopes[name] * name."""
 
     rest: Coefficient
@@ -66,20 +66,20 @@ class Forms:
     def __init__(self, names: frozenset[str], number: Number) -> None:
         self.names = names
         self.number = number
-        self.known: dict[Term, Form | None] = {}
+        self.known: dict[Term, AffineForm | None] = {}
 
-    def of(self, term: Term) -> Form | None:
+    def of(self, term: Term) -> AffineForm | None:
         """The term as an affine function of the variables; None if it is not written as one."""
         for node in unknown(term, self.known, lambda node: children(node) if node.free & self.names else ()):
             self.known[node] = self._form(node)
         return self.known[term]
 
-    def short(self, form: Form) -> Term:
+    def short(self, form: AffineForm) -> Term:
         """The term of a form, whose parts are known from now on."""
         for name, c in form.slopes.items():
-            self.known.setdefault(c.term, Form(c, {}))
-            self.known.setdefault(_product(c, Coefficient(var(name), math.nan)).term, Form(NONE, {name: c}))
-        self.known.setdefault(form.rest.term, Form(form.rest, {}))
+            self.known.setdefault(c.term, AffineForm(c, {}))
+            self.known.setdefault(_product(c, Coefficient(var(name), math.nan)).term, AffineForm(NONE, {name: c}))
+        self.known.setdefault(form.rest.term, AffineForm(form.rest, {}))
         found = form.term()
         self.known.setdefault(found, form)
         return found
@@ -87,11 +87,11 @@ class Forms:
     def plain(self, term: Term) -> Coefficient:
         return Coefficient(term, self.number(term))
 
-    def _form(self, node: Term) -> Form | None:
+    def _form(self, node: Term) -> AffineForm | None:
         if not node.free & self.names:
-            return Form(self.plain(node), {})
+            return AffineForm(self.plain(node), {})
         if isinstance(node, Var):
-            return Form(NONE, {node.name: Coefficient(ONE, 1.0)})
+            return AffineForm(NONE, {node.name: Coefficient(ONE, 1.0)})
         if not isinstance(node, Prim) or node.op not in ("add", "neg", "mul", "div"):
             return None
         parts = [self.known[arg] for arg in node.args]
@@ -114,21 +114,21 @@ class Forms:
         return found
 
 
-def scaled(form: Form, by: Coefficient) -> Form:
-    return Form(_product(form.rest, by), {name: _product(c, by) for name, c in form.slopes.items()})
+def scaled(form: AffineForm, by: Coefficient) -> AffineForm:
+    return AffineForm(_product(form.rest, by), {name: _product(c, by) for name, c in form.slopes.items()})
 
 
-def _divided(form: Form, by: Coefficient) -> Form:
-    return Form(_quotient(form.rest, by), {name: _quotient(c, by) for name, c in form.slopes.items()})
+def _divided(form: AffineForm, by: Coefficient) -> AffineForm:
+    return AffineForm(_quotient(form.rest, by), {name: _quotient(c, by) for name, c in form.slopes.items()})
 
 
-def _sum(forms: list[Form]) -> Form:
+def _sum(forms: list[AffineForm]) -> AffineForm:
     slopes: dict[str, list[Coefficient]] = {}
     for form in forms:
         for name, c in form.slopes.items():
             slopes.setdefault(name, []).append(c)
     found = {name: total(parts) for name, parts in slopes.items()}
-    return Form(total([form.rest for form in forms]), {n: c for n, c in found.items() if c.term is not ZERO})
+    return AffineForm(total([form.rest for form in forms]), {n: c for n, c in found.items() if c.term is not ZERO})
 
 
 def total(parts: list[Coefficient]) -> Coefficient:
@@ -170,22 +170,22 @@ def _quotient(a: Coefficient, b: Coefficient) -> Coefficient:
 Premises = tuple[Term, ...]
 
 
-class Extent(Struct, frozen=True):
+class VariableBounds(Struct, frozen=True):
     """The bounds of one variable."""
 
     lo: Coefficient
     hi: Coefficient
 
 
-class Region(Struct, eq=False):
+class Polytope(Struct, eq=False):
     """What conditions leave of a box: each a form that is >= 0 there. decided: sides, by what they are known by."""
 
-    box: Mapping[str, Extent]
-    conditions: tuple[Form, ...] = ()
+    box: Mapping[str, VariableBounds]
+    conditions: tuple[AffineForm, ...] = ()
     decided: Mapping[Hashable, bool] = {}
-    further: dict[tuple[Hashable, bool], tuple[Region | None, Premises]] = {}
+    further: dict[tuple[Hashable, bool], tuple[Polytope | None, Premises]] = {}
 
-    def side(self, key: Hashable, form: Form | None, up: bool) -> tuple[Region | None, Premises]:
+    def side(self, key: Hashable, form: AffineForm | None, up: bool) -> tuple[Polytope | None, Premises]:
         """The part where a form is >= 0 (up) or <= 0: None if it is proved to be empty, with the proof's premises.
 
         key: what the form is known by, here and in the parts.
@@ -197,7 +197,7 @@ class Region(Struct, eq=False):
             found = self.further[key, up] = self._side(key, form, up)
         return found
 
-    def _side(self, key: Hashable, form: Form | None, up: bool) -> tuple[Region | None, Premises]:
+    def _side(self, key: Hashable, form: AffineForm | None, up: bool) -> tuple[Polytope | None, Premises]:
         conditions = self.conditions
         if form is not None:
             form = form if up else _opposite(form)
@@ -205,9 +205,9 @@ class Region(Struct, eq=False):
             if premises is not None:
                 return None, premises
             conditions = (*conditions, form)
-        return Region(self.box, conditions, {**self.decided, key: up}), ()
+        return Polytope(self.box, conditions, {**self.decided, key: up}), ()
 
-    def empty(self, form: Form) -> Premises | None:
+    def empty(self, form: AffineForm) -> Premises | None:
         """The premises of a proof that the form is nowhere >= 0 in the region; None if none was found."""
         for combined, signs in self._combinations(form):
             size = _highest(combined, self.box)
@@ -215,7 +215,7 @@ class Region(Struct, eq=False):
                 return (*signs, *_below_zero(combined, self.box))
         return None
 
-    def _combinations(self, form: Form) -> Iterator[tuple[Form, Premises]]:
+    def _combinations(self, form: AffineForm) -> Iterator[tuple[AffineForm, Premises]]:
         yield form, ()
         for other in reversed(self.conditions):
             for name, c in form.slopes.items():
@@ -233,12 +233,12 @@ class Region(Struct, eq=False):
                 )
 
 
-def _opposite(form: Form) -> Form:
+def _opposite(form: AffineForm) -> AffineForm:
     return scaled(form, Coefficient(const(-1.0), -1.0))
 
 
-def _without(name: str, form: Form) -> Form:
-    return Form(form.rest, {n: c for n, c in form.slopes.items() if n != name})
+def _without(name: str, form: AffineForm) -> AffineForm:
+    return AffineForm(form.rest, {n: c for n, c in form.slopes.items() if n != name})
 
 
 def _negative(c: Coefficient) -> Coefficient:
@@ -249,7 +249,7 @@ def _unless_number(term: Term) -> Premises:
     return () if isinstance(term, Const) else (term,)
 
 
-def _highest(form: Form, box: Mapping[str, Extent]) -> tuple[float, float] | None:
+def _highest(form: AffineForm, box: Mapping[str, VariableBounds]) -> tuple[float, float] | None:
     """An upper bound of a form in a box, and how large the parts are; None if there is none."""
     high, size = form.rest.value, abs(form.rest.value)
     for name, c in form.slopes.items():
@@ -264,7 +264,7 @@ def _highest(form: Form, box: Mapping[str, Extent]) -> tuple[float, float] | Non
     return (high, size) if math.isfinite(high) else None
 
 
-def _below_zero(form: Form, box: Mapping[str, Extent]) -> Premises:
+def _below_zero(form: AffineForm, box: Mapping[str, VariableBounds]) -> Premises:
     """The term that is positive where the upper bound is negative."""
     parts: list[Coefficient] = [form.rest]
     for name, c in form.slopes.items():
@@ -277,27 +277,27 @@ def _below_zero(form: Form, box: Mapping[str, Extent]) -> Premises:
     return _unless_number(_negative(total(parts)).term)
 
 
-def region_of(around: Integral, forms: Forms, outer: Region) -> tuple[Region, Premises]:
+def region_of(around: Integral, forms: Forms, outer: Polytope) -> tuple[Polytope, Premises]:
     """What an integral's bounds leave inside of a region, and the premises that they do."""
     box, conditions, premises = dict(outer.box), list(outer.conditions), dict[Term, None]()
     for name, (lo, hi) in zip(around.variables, around.bounds, strict=True):
         if not (lo.free | hi.free) & forms.names:
-            box[name] = Extent(forms.plain(lo), forms.plain(hi))
+            box[name] = VariableBounds(forms.plain(lo), forms.plain(hi))
             continue
         found = [range_of(bound, {n: _widest(e) for n, e in box.items()}) for bound in (lo, hi)]
         low, high = min(r.lo for r in found), max(r.hi for r in found)
         first, last = forms.of(lo), forms.of(hi)
         if first is not None and last is not None:
-            turned = Region(box, tuple(conditions)).empty(_sum([first, _opposite(last)]))
+            turned = Polytope(box, tuple(conditions)).empty(_sum([first, _opposite(last)]))
             if turned is not None:  # they are never the other way round
-                here = Form(NONE, {name: Coefficient(ONE, 1.0)})
+                here = AffineForm(NONE, {name: Coefficient(ONE, 1.0)})
                 conditions += [_sum([here, _opposite(first)]), _sum([last, _opposite(here)])]
                 premises |= dict.fromkeys(turned)
-        box[name] = Extent(Coefficient(const(low), low), Coefficient(const(high), high))
-    return Region(box, tuple(conditions)), tuple(premises)
+        box[name] = VariableBounds(Coefficient(const(low), low), Coefficient(const(high), high))
+    return Polytope(box, tuple(conditions)), tuple(premises)
 
 
-def _widest(extent: Extent) -> tuple[float, float]:
+def _widest(extent: VariableBounds) -> tuple[float, float]:
     if isinstance(extent.lo.term, Const) and isinstance(extent.hi.term, Const):
         return extent.lo.value, extent.hi.value
     return -math.inf, math.inf

@@ -23,7 +23,7 @@ from potto.primitives.walking import Domain
 Box = Mapping[str, tuple[float, float]]  # of each variable the lowest and the highest value
 
 
-class Range(Struct, frozen=True):
+class ValueRange(Struct, frozen=True):
     """Values lie in [lo, hi]; `zero` says whether 0 may be one of them (exp never is)."""
 
     lo: float
@@ -44,31 +44,31 @@ class Range(Struct, frozen=True):
         return self.lo == math.inf or self.hi == -math.inf
 
 
-ANYTHING = Range(-math.inf, math.inf)
-_POSITIVE = Range(0.0, math.inf, False)
-_NONNEGATIVE = Range(0.0, math.inf)
+ANYTHING = ValueRange(-math.inf, math.inf)
+_POSITIVE = ValueRange(0.0, math.inf, False)
+_NONNEGATIVE = ValueRange(0.0, math.inf)
 
 
-def _range(lo: float, hi: float, zero: bool = True) -> Range:
+def _range(lo: float, hi: float, zero: bool = True) -> ValueRange:
     """Rounded outwards; nan (inf - inf, 0 * inf) becomes no bound. A sign that was certain stays."""
     low = -math.inf if lo != lo else (lo if lo == 0 or math.isinf(lo) else math.nextafter(lo, -math.inf))
     high = math.inf if hi != hi else (hi if hi == 0 or math.isinf(hi) else math.nextafter(hi, math.inf))
-    return Range(low, high, zero and low <= 0 <= high)
+    return ValueRange(low, high, zero and low <= 0 <= high)
 
 
-def ranges(term: Term, box: Mapping[str, tuple[float, float]] | None = None) -> dict[Term, Range]:
+def ranges(term: Term, box: Mapping[str, tuple[float, float]] | None = None) -> dict[Term, ValueRange]:
     """The range of every subterm; `box` bounds variables."""
     bounds = {name: (min(ends), max(ends)) for name, ends in (box or {}).items()}
-    found: dict[Term, Range] = {}
-    RANGES.walk((term,), {name: Range(lo, hi, lo <= 0 <= hi) for name, (lo, hi) in bounds.items()}, found)
+    found: dict[Term, ValueRange] = {}
+    RANGES.walk((term,), {name: ValueRange(lo, hi, lo <= 0 <= hi) for name, (lo, hi) in bounds.items()}, found)
     return found
 
 
 # What the form alone shows, kept as long as the term lives: roots are built up and asked about step by step.
-_known: WeakKeyDictionary[Term, Range] = WeakKeyDictionary()
+_known: WeakKeyDictionary[Term, ValueRange] = WeakKeyDictionary()
 
 
-def range_of(term: Term, box: Mapping[str, tuple[float, float]] | None = None) -> Range:
+def range_of(term: Term, box: Mapping[str, tuple[float, float]] | None = None) -> ValueRange:
     if box:
         return ranges(term, box)[term]
     for node in unknown(term, _known):
@@ -104,22 +104,22 @@ def nonnegative(term: Term) -> bool:
     return range_of(term).lo >= 0
 
 
-class _Ranges(Domain[Range]):
+class _Ranges(Domain[ValueRange]):
     """Ranges of builtins: arithmetic as below, everything else by the rules of the entries."""
 
-    def constant(self, node: Const) -> Range:
-        return Range(node.value, node.value, node.value == 0) if node.value == node.value else ANYTHING
+    def constant(self, node: Const) -> ValueRange:
+        return ValueRange(node.value, node.value, node.value == 0) if node.value == node.value else ANYTHING
 
-    def unknown(self) -> Range:
+    def unknown(self) -> ValueRange:
         return ANYTHING
 
-    def other(self, node: Term, known: Mapping[Term, Range]) -> Range:
+    def other(self, node: Term, known: Mapping[Term, ValueRange]) -> ValueRange:
         if not isinstance(node, If | Branch):
             return ANYTHING
         then, orelse = known[node.then], known[node.orelse]
-        return Range(min(then.lo, orelse.lo), max(then.hi, orelse.hi), then.zero or orelse.zero)
+        return ValueRange(min(then.lo, orelse.lo), max(then.hi, orelse.hi), then.zero or orelse.zero)
 
-    def builtin(self, node: Prim, known: Mapping[Term, Range]) -> Range:
+    def builtin(self, node: Prim, known: Mapping[Term, ValueRange]) -> ValueRange:
         rule = ARITHMETIC.get(node.op)
         args = [known[arg] for arg in node.args]
         return rule(node, args) if rule is not None else self.apply(node.op, args)
@@ -127,7 +127,7 @@ class _Ranges(Domain[Range]):
     def does(self, op: str) -> bool:
         return op in ARITHMETIC
 
-    def rule(self, entry: Primitive) -> Callable[..., Range] | None:
+    def rule(self, entry: Primitive) -> Callable[..., ValueRange] | None:
         return _rule(entry.name)
 
 
@@ -135,14 +135,14 @@ RANGES = _Ranges()
 
 
 @lru_cache(maxsize=256)
-def _rule(op: str) -> Callable[..., Range] | None:
+def _rule(op: str) -> Callable[..., ValueRange] | None:
     entry = PRIMITIVES[op]
     if entry.interval is None and not entry.piecewise_monotone:
         return None
     return lambda *args: _bounded(entry, args)
 
 
-def _bounded(entry: Primitive, args: tuple[Range, ...]) -> Range:
+def _bounded(entry: Primitive, args: tuple[ValueRange, ...]) -> ValueRange:
     """By the entry's rule, with room for what a libm may be off; a sign that is certain stays."""
     bounds = [(a.lo, a.hi) for a in args]
     if entry.interval is not None:
@@ -156,10 +156,10 @@ def _bounded(entry: Primitive, args: tuple[Range, ...]) -> Range:
     off = max(0.0, *(entry.strays(*ends) for ends in zip(*bounds, strict=True)))  # nan at infinity
     low, high = ((e + s * (room * abs(e) + off) if math.isfinite(e) else e) for e, s in ((lo, -1), (hi, 1)))
     found = _range(low, high, _may_vanish(entry, args))
-    return Range(max(found.lo, entry.image[0]), min(found.hi, entry.image[1]), found.zero)
+    return ValueRange(max(found.lo, entry.image[0]), min(found.hi, entry.image[1]), found.zero)
 
 
-def _may_vanish(entry: Primitive, args: tuple[Range, ...]) -> bool:
+def _may_vanish(entry: Primitive, args: tuple[ValueRange, ...]) -> bool:
     """Whether 0 may be a value, by where the roots are."""
     if entry.roots is None:
         return True
@@ -169,7 +169,7 @@ def _may_vanish(entry: Primitive, args: tuple[Range, ...]) -> bool:
     return entry.roots != (0.0,) or all(a.zero for a in args)
 
 
-def _add(node: Prim, args: list[Range]) -> Range:
+def _add(node: Prim, args: list[ValueRange]) -> ValueRange:
     lo, hi = math.fsum(a.lo for a in args if a.lo != -math.inf), math.fsum(a.hi for a in args if a.hi != math.inf)
     low = -math.inf if any(a.lo == -math.inf for a in args) else lo
     high = math.inf if any(a.hi == math.inf for a in args) else hi
@@ -178,17 +178,17 @@ def _add(node: Prim, args: list[Range]) -> Range:
     return _range(low, high, not (up or down))
 
 
-def _neg(node: Prim, args: list[Range]) -> Range:
-    return Range(-args[0].hi, -args[0].lo, args[0].zero)
+def _neg(node: Prim, args: list[ValueRange]) -> ValueRange:
+    return ValueRange(-args[0].hi, -args[0].lo, args[0].zero)
 
 
-def _times(a: Range, b: Range) -> Range:
+def _times(a: ValueRange, b: ValueRange) -> ValueRange:
     corners = [0.0 if x == 0 or y == 0 else x * y for x in (a.lo, a.hi) for y in (b.lo, b.hi)]
     return _range(min(corners), max(corners), a.zero or b.zero)
 
 
-def _mul(node: Prim, args: list[Range]) -> Range:
-    result = Range(1.0, 1.0, False)
+def _mul(node: Prim, args: list[ValueRange]) -> ValueRange:
+    result = ValueRange(1.0, 1.0, False)
     counts: dict[Term, int] = {}
     by_term = dict(zip(node.args, args, strict=True))
     for arg in node.args:
@@ -198,20 +198,20 @@ def _mul(node: Prim, args: list[Range]) -> Range:
     return result
 
 
-def _inverse(a: Range) -> Range:
+def _inverse(a: ValueRange) -> ValueRange:
     if a.positive or a.negative:
         lo = 1 / a.hi if a.hi else -math.inf
         hi = 1 / a.lo if a.lo else math.inf
         return _range(lo, hi, False)
-    return Range(-math.inf, math.inf, False)
+    return ValueRange(-math.inf, math.inf, False)
 
 
-def _div(node: Prim, args: list[Range]) -> Range:
+def _div(node: Prim, args: list[ValueRange]) -> ValueRange:
     top, below = args
     return _times(top, _inverse(below))
 
 
-def _whole_power(a: Range, n: int) -> Range:
+def _whole_power(a: ValueRange, n: int) -> ValueRange:
     def raised(x: float) -> float:
         try:
             return float(x**n)
@@ -225,7 +225,7 @@ def _whole_power(a: Range, n: int) -> Range:
     return _range(*ends, a.zero)
 
 
-def _pow(node: Prim, args: list[Range]) -> Range:
+def _pow(node: Prim, args: list[ValueRange]) -> ValueRange:
     base, exponent = args[0], node.args[1]
     if isinstance(exponent, Const) and exponent.value == exponent.value:
         power = exponent.value
@@ -236,7 +236,7 @@ def _pow(node: Prim, args: list[Range]) -> Range:
     return _POSITIVE if base.positive else ANYTHING
 
 
-ARITHMETIC: dict[str, Callable[[Prim, list[Range]], Range]] = {
+ARITHMETIC: dict[str, Callable[[Prim, list[ValueRange]], ValueRange]] = {
     "add": _add,
     "neg": _neg,
     "mul": _mul,

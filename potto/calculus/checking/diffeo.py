@@ -20,7 +20,7 @@ from potto.calculus.checking.solvability import (
     COMPONENTS,
     NO_INVERSE,
     WRONG_INVERSE,
-    Problem,
+    ConditionProblem,
     Role,
     Verdict,
     failure,
@@ -34,7 +34,7 @@ from potto.calculus.differentiation.dual import Differentiator
 from potto.calculus.inlining.expand import Resolve, expanded
 from potto.calculus.inlining.numbers import as_parameters
 from potto.calculus.inlining.relevance import may_integrate
-from potto.calculus.solving.inverse_map import Failure, Inverse, invert, listed
+from potto.calculus.solving.inverse_map import Failure, InverseMap, invert, listed
 from potto.calculus.solving.isolate import Guard
 from potto.calculus.solving.pivots import NoClosedForm
 from potto.calculus.solving.verify import Refuted, Untested, Verified, box_of, guards_of, verify
@@ -188,12 +188,12 @@ def _judged(
 @lru_cache(maxsize=4096)
 def _verdict(
     coordinates: tuple[Term, ...], variables: tuple[str, ...], box: _Bounds, whole: bool, role: Role
-) -> Problem | None:
+) -> ConditionProblem | None:
     """What there is to say of a condition. Most edits leave most conditions as they are."""
     found = judge(coordinates, variables, dict(box), whole, role)
     if isinstance(found, Verdict) and found.searched:
         return searched(found.searched, [v for v in variables if v in coordinates[0].free], found.pivot)
-    return found if isinstance(found, Problem) else None
+    return found if isinstance(found, ConditionProblem) else None
 
 
 def _products(
@@ -232,7 +232,7 @@ def _readable(condition: Condition) -> Condition:
     return replace(condition, coordinates=coordinates, box={plain.get(n, n): b for n, b in condition.box.items()})
 
 
-def _diagnostic(problem: Problem, span: Span, calls: Sequence[str] = ()) -> Diagnostic:
+def _diagnostic(problem: ConditionProblem, span: Span, calls: Sequence[str] = ()) -> Diagnostic:
     notes = problem.notes
     if calls:
         notes = (*notes, f"the condition is inside {called_by(calls)}")
@@ -281,7 +281,7 @@ def _components_span(item: nodes.DiffeoDefinition) -> Span:
     return item.components[0].span.cover(item.components[-1].span)
 
 
-def _inverted(item: nodes.DiffeoDefinition, what: _Map, found: Inverse | Failure, span: Span) -> _Study:
+def _inverted(item: nodes.DiffeoDefinition, what: _Map, found: InverseMap | Failure, span: Span) -> _Study:
     """The inverse that was found, on the branch that `where` selects."""
     if isinstance(found, Failure):
         return _Study((_diagnostic(failure(found, what.components, what.variables), span),), None)
@@ -290,7 +290,7 @@ def _inverted(item: nodes.DiffeoDefinition, what: _Map, found: Inverse | Failure
     if what.where and len(branches) > 1:
         kept = [b for b in branches if isinstance(_on_branch(what, found.values, b), Verified)]
         if not kept:
-            problem = Problem(
+            problem = ConditionProblem(
                 NO_INVERSE,
                 f"none of the {len(branches)} solutions found lies on the branch that `where` selects",
                 "no inverse on this branch",
@@ -315,13 +315,13 @@ def _authors(
     item: nodes.DiffeoDefinition,
     span: Span,
     what: _Map,
-    found: Inverse | Failure,
+    found: InverseMap | Failure,
     values: tuple[str, ...],
     parts: tuple[Term, ...],
 ) -> _Study:
     """The author's inverse, verified."""
     if len(values) != len(what.components) or len(parts) != len(what.variables):
-        problem = Problem(
+        problem = ConditionProblem(
             COMPONENTS,
             f"the inverse takes {many(len(values), 'value')} to {many(len(parts), 'component')}, "
             f"but the map takes {many(len(what.variables), 'variable')} to {many(len(what.components), 'component')}",
@@ -334,7 +334,7 @@ def _authors(
     if isinstance(outcome, Refuted):
         return _Study((_diagnostic(_wrong(what, outcome), span),), None)
     if isinstance(outcome, Untested):
-        problem = Problem(
+        problem = ConditionProblem(
             WRONG_INVERSE,
             "the inverse could not be verified: no point was found where both it and the map are defined",
             "not verified",
@@ -351,13 +351,13 @@ def _authors(
     return _Study((), info)
 
 
-def _wrong(what: _Map, refuted: Refuted) -> Problem:
+def _wrong(what: _Map, refuted: Refuted) -> ConditionProblem:
     at = ", ".join(f"{n} = {v:.6g}" for n, v in refuted.point.items())
     back = ", ".join(f"{n} = {v:.6g}" for n, v in refuted.back.items())
     off = f", which is off by {refuted.off:.1e}" if math.isfinite(refuted.off) else ""
     hint = "" if what.where else "; if it is right on one branch only, select that with `where`"
     nowhere = not all(math.isfinite(v) for v in refuted.back.values())
-    return Problem(
+    return ConditionProblem(
         WRONG_INVERSE,
         f"this inverse does not lead back: it is not defined where the map leads from {at}"
         if nowhere

@@ -5,16 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from potto.calculus.algebra.ranges import Box
-from potto.calculus.checking.solvability import COMPONENTS, NO_INVERSE, NOT_DIFFERENTIABLE, Problem, kinks
+from potto.calculus.checking.solvability import COMPONENTS, NO_INVERSE, NOT_DIFFERENTIABLE, ConditionProblem, kinks
 from potto.calculus.solving.inverse_map import listed
 from potto.core.printer import format_term
 from potto.core.terms import App, Term, postorder
 
 
-def wrong_shape(components: Sequence[Term], variables: Sequence[str], box: Box) -> Problem | None:
+def wrong_shape(components: Sequence[Term], variables: Sequence[str], box: Box) -> ConditionProblem | None:
     """Too few or too many components, or a place where one is not differentiable."""
     if len(components) != len(variables):
-        return Problem(
+        return ConditionProblem(
             COMPONENTS,
             f"{many(len(components), 'component')} over {many(len(variables), 'variable')}",
             f"{len(components)} here, {many(len(variables), 'variable')}",
@@ -24,7 +24,7 @@ def wrong_shape(components: Sequence[Term], variables: Sequence[str], box: Box) 
     kink = kinks(components, variables, box)
     if kink is None:
         return None
-    return Problem(
+    return ConditionProblem(
         NOT_DIFFERENTIABLE,
         f"the map is not differentiable where `{format_term(kink)}` is 0",
         "has a kink",
@@ -33,11 +33,11 @@ def wrong_shape(components: Sequence[Term], variables: Sequence[str], box: Box) 
     )
 
 
-def unknown_call(components: Sequence[Term], variables: Sequence[str]) -> Problem | None:
+def unknown_call(components: Sequence[Term], variables: Sequence[str]) -> ConditionProblem | None:
     """A call of a parameter, or of what always needs itself again, of which nothing is known before the map is used."""
     for node in postorder(*components):
         if isinstance(node, App) and node.free & frozenset(variables):
-            return Problem(
+            return ConditionProblem(
                 NO_INVERSE,
                 f"no inverse was found for ({', '.join(map(format_term, components))}) in {listed(variables)}: "
                 f"what `{format_term(node)}` gives is not known here",

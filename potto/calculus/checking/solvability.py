@@ -19,7 +19,7 @@ from potto.calculus.algebra.ranges import Box, ranges
 from potto.calculus.algebra.rational_form import is_zero
 from potto.calculus.differentiation.derivative import NotSmooth, partial
 from potto.calculus.solving.enclosable import searchable
-from potto.calculus.solving.inverse_map import Failure, Inverse, dependence, invert, jacobian, listed
+from potto.calculus.solving.inverse_map import Failure, InverseMap, dependence, invert, jacobian, listed
 from potto.calculus.solving.solve import Sections, sections
 from potto.calculus.surfaces.nested_brackets import in_loops, pieces
 from potto.core.printer import LONGEST, abridged, format_term
@@ -36,7 +36,7 @@ MEASURE_ZERO = declare("P0406", "a condition that holds on no area", "warning")
 SEARCHED = declare("P0616", "a surface that is searched for", "hint")
 
 
-class Problem(Struct, frozen=True):
+class ConditionProblem(Struct, frozen=True):
     """What is wrong with a condition, for a diagnostic to be made of."""
 
     kind: Kind
@@ -59,7 +59,7 @@ class Verdict(Struct, frozen=True):
     completion: tuple[Term, ...]
     determinant: Term | None
     roots: Sections | None
-    inverse: Inverse | None = None
+    inverse: InverseMap | None = None
     searched: tuple[Term, ...] = ()
 
 
@@ -68,7 +68,7 @@ Role = Literal["bracket", "delta", "map"]
 
 def judge(
     coordinates: Sequence[Term], variables: Sequence[str], box: Box, whole: bool = False, role: Role = "bracket"
-) -> Verdict | Problem:
+) -> Verdict | ConditionProblem:
     """The verdict on a condition; `whole`: its author wrote all coordinates, as many as variables. What is a map or has
     several coordinates is declared a diffeomorphism, which must have an inverse."""
     if len(coordinates) > 1:
@@ -78,10 +78,10 @@ def judge(
     return _judged(coordinates, variables, box, whole, role)
 
 
-def _in_cases(surface: Term, variables: Sequence[str], box: Box, role: Role) -> Verdict | Problem:
+def _in_cases(surface: Term, variables: Sequence[str], box: Box, role: Role) -> Verdict | ConditionProblem:
     """The verdict on a condition with brackets inside: on each of its cases."""
     verdicts: list[Verdict] = []
-    empty: Problem | None = None
+    empty: ConditionProblem | None = None
     for case in pieces(surface):
         if in_loops(case) or not case.free.intersection(variables):
             continue
@@ -98,9 +98,9 @@ def _in_cases(surface: Term, variables: Sequence[str], box: Box, role: Role) -> 
     return Verdict(verdicts[0].pivot, (), None, None, searched=searched)
 
 
-def _broken(coordinates: Sequence[Term]) -> Problem:
+def _broken(coordinates: Sequence[Term]) -> ConditionProblem:
     inner = next(node for c in coordinates for node in postorder(c) if isinstance(node, Branch))
-    return Problem(
+    return ConditionProblem(
         NOT_DIFFERENTIABLE,
         f"the map jumps where `{format_term(inner.surface)}` is 0",
         "jumps",
@@ -111,7 +111,7 @@ def _broken(coordinates: Sequence[Term]) -> Problem:
 
 def _judged(
     coordinates: Sequence[Term], variables: Sequence[str], box: Box, whole: bool, role: Role
-) -> Verdict | Problem:
+) -> Verdict | ConditionProblem:
     """The verdict on a condition without brackets inside."""
     surface = coordinates[0]
     if len(coordinates) > 1:
@@ -139,7 +139,7 @@ def _judged(
             inverse = invert(coordinates, variables)
         except NotSmooth:
             return no_inverse(surface, mine, reasons, role)
-        if isinstance(inverse, Inverse):
+        if isinstance(inverse, InverseMap):
             return Verdict(mine[-1], (), inverse.determinant, None, inverse)
     found_by_search = next((name for name in reversed(mine) if searchable(surface, name)), None)
     if role != "map" and found_by_search is not None:
@@ -149,7 +149,7 @@ def _judged(
 
 def _solved(
     coordinates: Sequence[Term], variables: Sequence[str], name: str, found: Sections | None
-) -> Verdict | Problem:
+) -> Verdict | ConditionProblem:
     """The coordinates that are missing are the other variables: with the first one solved for `name`, that inverts."""
     missing = tuple(var(v) for v in variables if v != name) if len(coordinates) < len(variables) else ()
     completed = (coordinates[0], *missing) if missing else tuple(coordinates)
@@ -177,7 +177,7 @@ def shown(terms: Sequence[Term]) -> str:
     return ", ".join(f"`{abridged(t)}`" for t in terms)
 
 
-def singular(coordinates: Sequence[Term], variables: Sequence[str]) -> Problem | None:
+def singular(coordinates: Sequence[Term], variables: Sequence[str]) -> ConditionProblem | None:
     try:
         rows = jacobian(coordinates, variables)
     except NotSmooth:
@@ -186,7 +186,7 @@ def singular(coordinates: Sequence[Term], variables: Sequence[str]) -> Problem |
     if not is_zero(det):
         return None
     table = "; ".join(", ".join(format_term(entry) for entry in row) for row in rows)
-    return Problem(
+    return ConditionProblem(
         SINGULAR,
         f"({', '.join(map(format_term, coordinates))}) is not invertible in {listed(variables)}: its determinant is 0",
         "singular",
@@ -195,8 +195,8 @@ def singular(coordinates: Sequence[Term], variables: Sequence[str]) -> Problem |
     )
 
 
-def _too_many(coordinates: Sequence[Term], variables: Sequence[str]) -> Problem:
-    return Problem(
+def _too_many(coordinates: Sequence[Term], variables: Sequence[str]) -> ConditionProblem:
+    return ConditionProblem(
         COMPONENTS,
         f"{len(coordinates)} coordinates over {_count(len(variables))} of integration ({listed(variables)})",
         f"{len(coordinates)} coordinates",
@@ -209,11 +209,11 @@ def _count(n: int) -> str:
     return f"{n} variable" if n == 1 else f"{n} variables"
 
 
-def _empty(surface: Term, box: Box) -> Problem | None:
+def _empty(surface: Term, box: Box) -> ConditionProblem | None:
     bounds = ranges(surface, box)[surface]
     if bounds.hi > 0:
         return None
-    return Problem(
+    return ConditionProblem(
         MEASURE_ZERO,
         f"`{format_term(surface)}` is never positive, so the condition holds at most on a set without area",
         "never positive",
@@ -231,7 +231,7 @@ _ADVICE: dict[Role, str] = {
 
 def no_inverse(
     surface: Term, variables: Sequence[str], reasons: Sequence[str], role: Role = "bracket", searchable: bool = False
-) -> Problem:
+) -> ConditionProblem:
     help = _ADVICE[role if searchable else "bracket"].format(format_term(surface))  # it is to be written
     inner = next((node for node in postorder(surface) if isinstance(node, Integral)), None)
     if inner is not None:  # neither can be done: an inverse is a formula, and is verified as one
@@ -243,7 +243,7 @@ def no_inverse(
     if named is not None and role == "bracket":  # what is arithmetic, or an array, is not seen as a name here
         reasons = (*reasons, f"`{named.name}` is found numerically, and the surface must be known beforehand")
         help = f"make `{named.name}` a parameter, and give the definition as its argument"
-    return Problem(
+    return ConditionProblem(
         NO_INVERSE,
         f"no inverse was found for `{abridged(surface)}` in {listed(variables, 'or')}",
         "cannot be solved for where it is 0",
@@ -252,14 +252,14 @@ def no_inverse(
     )
 
 
-def searched(surfaces: Sequence[Term], variables: Sequence[str], roots: str) -> Problem:
+def searched(surfaces: Sequence[Term], variables: Sequence[str], roots: str) -> ConditionProblem:
     """What to say of surfaces that have no closed form along any variable."""
     further = [v for v in variables if v != roots]
     cost = f"once for each node in {listed(further)}" if further else "once for each value of the integral"
     what = f"where {shown(surfaces)} {'is' if len(surfaces) == 1 else 'are'} 0"
     if any(len(format_term(surface)) > LONGEST for surface in surfaces):  # what is written says more, and stands there
         what = "this surface"
-    return Problem(
+    return ConditionProblem(
         SEARCHED,
         f"{what} has no closed form: it is searched for",
         "searched for",
@@ -292,9 +292,9 @@ def _bends(node: Prim) -> bool:
     return any(isinstance(part, Branch) for part in postorder(*entry.partials(*node.args)))
 
 
-def failure(found: Failure, coordinates: Sequence[Term], variables: Sequence[str]) -> Problem:
+def failure(found: Failure, coordinates: Sequence[Term], variables: Sequence[str]) -> ConditionProblem:
     """What to say when a diffeomorphism has no inverse."""
-    return Problem(
+    return ConditionProblem(
         NO_INVERSE,
         f"no inverse was found for ({', '.join(map(format_term, coordinates))}) in {listed(variables)}",
         "no inverse found",

@@ -49,7 +49,7 @@ Names = frozenset[str]
 Scaled = Callable[[Term], Term]
 
 
-class Step(Struct, frozen=True):
+class EliminationStep(Struct, frozen=True):
     """V(state) = integral over [lo, hi] of weight * V_next(passed) d(variable).
 
     state: the name of the number that is handed on from further out; None where there is none. passed: the number that
@@ -70,19 +70,19 @@ class _MoreThanOne(Exception):
 
 
 @lru_cache(maxsize=1024)
-def eliminate(term: Integral) -> tuple[Step, ...] | None:
+def eliminate(term: Integral) -> tuple[EliminationStep, ...] | None:
     """The steps, outermost first; None where more than one number would have to be handed on."""
     everything = (term.body, *(bound for pair in term.bounds for bound in pair))
     kinds = (Const, Var, Prim, Branch, If, App, Global)
     if not all(isinstance(node, kinds) for part in everything for node in postorder(part)):
         return None
     rest, bounds, state = _bare(term.body), list(term.bounds), None
-    steps: list[Step] = []
+    steps: list[EliminationStep] = []
     for i, variable in enumerate(term.variables):
         lo, hi = bounds[i]
         inner = frozenset(term.variables[i + 1 :])
         if not inner:
-            return (*steps, Step(variable, lo, hi, state, rest, None))
+            return (*steps, EliminationStep(variable, lo, hi, state, rest, None))
         here = frozenset((variable,)) if state is None else frozenset((variable, state))
         weight, rest = _split(rest, here, inner)
         handed = _Handed(here, inner, f"{variable}@known")
@@ -91,7 +91,7 @@ def eliminate(term: Integral) -> tuple[Step, ...] | None:
             bounds[i + 1 :] = [(handed.put(a), handed.put(b)) for a, b in bounds[i + 1 :]]
         except _MoreThanOne:
             return None
-        steps.append(Step(variable, lo, hi, state, weight, handed.written))
+        steps.append(EliminationStep(variable, lo, hi, state, weight, handed.written))
         state = None if handed.written is None else handed.name
     return None
 

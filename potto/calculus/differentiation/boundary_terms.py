@@ -19,7 +19,7 @@ from potto.calculus.algebra.rational_form import is_zero
 from potto.calculus.differentiation.between import between, scaled
 from potto.calculus.differentiation.derivative import partial, total, vanishes, zero_like
 from potto.calculus.solving.pivots import NoClosedForm as NoClosedForm
-from potto.calculus.solving.pivots import Root, chosen, conjunction, pivots
+from potto.calculus.solving.pivots import SurfaceRoot, chosen, conjunction, pivots
 from potto.calculus.solving.solve import factors
 from potto.calculus.surfaces.branch_assignment import (
     NOWHERE,
@@ -80,7 +80,7 @@ def at_surfaces(node: Integral, moving: frozenset[str], rate: Rate, folding: boo
             if factor.free & frozenset(node.variables) and factor.free & moving:
                 surfaces.setdefault(normalized_surface(factor)[0], []).append(item)
     terms: list[Term] = []
-    met: list[Root] = []
+    met: list[SurfaceRoot] = []
     for surface, members in surfaces.items():
         try:
             terms += _at_surface(node, surface, members, branches, met, rate, folding)
@@ -90,8 +90,8 @@ def at_surfaces(node: Integral, moving: frozenset[str], rate: Rate, folding: boo
 
 
 def _at_surface(
-    node: Integral, surface: Term, members: Sequence[Branch], branches: list[Branch], met: list[Root], rate: Rate,
-    folding: bool,
+    node: Integral, surface: Term, members: Sequence[Branch], branches: list[Branch], met: list[SurfaceRoot],
+    rate: Rate, folding: bool,
 ) -> list[Term]:  # fmt: skip
     """The boundary terms of a surface at its roots, but those already met; under loops each instance of it has a pivot
     of its own. Raises NoClosedForm."""
@@ -132,7 +132,7 @@ def _side(product: Term, factor: Term, variables: Iterable[str]) -> Term:
     return add(*(mul(partial(product, name), partial(factor, name)) for name in variables if name in factor.free))
 
 
-def _same(root: Root, other: Root) -> bool:
+def _same(root: SurfaceRoot, other: SurfaceRoot) -> bool:
     if root.variable != other.variable or (root.index is None) != (other.index is None):
         return False
     return is_zero(sub(unguarded(root.at), unguarded(other.at))) and not _apart(root.at, other.at)
@@ -149,7 +149,7 @@ def _guards(at: Term) -> list[Term]:
 
 
 def _at_root(
-    node: Integral, flips: Flips, root: Root, rate: Rate, sums: list[Loop], where: Sequence[Term]
+    node: Integral, flips: Flips, root: SurfaceRoot, rate: Rate, sums: list[Loop], where: Sequence[Term]
 ) -> Iterator[Term]:
     """What is gained at a root, for those instances of it for which some conditions hold."""
     speed = rate(root.at)

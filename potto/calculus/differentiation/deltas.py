@@ -14,7 +14,7 @@ from potto.calculus.differentiation import level_sets
 from potto.calculus.differentiation.between import between, scaled
 from potto.calculus.differentiation.boundary_terms import remaining
 from potto.calculus.differentiation.derivative import partial, total, vanishes, zero_like
-from potto.calculus.solving.pivots import NoClosedForm, Root, chosen, pivots
+from potto.calculus.solving.pivots import NoClosedForm, SurfaceRoot, chosen, pivots
 from potto.calculus.surfaces.branch_assignment import branches_of, flipping, forced, unguarded
 from potto.core.printer import format_term
 from potto.core.simplify import normalized_surface
@@ -174,7 +174,7 @@ def _check_apart(factor: Term, what: Delta) -> None:
             raise _jump(what)
 
 
-def _check_single(factor: Term, what: Delta, root: Root) -> None:
+def _check_single(factor: Term, what: Delta, root: SurfaceRoot) -> None:
     """No other delta, and no jump, on the same surface."""
     for part in postorder(factor):
         if isinstance(part, Delta):
@@ -220,7 +220,7 @@ def _magnitude(slope: Term) -> Term:
     return neg(slope) if bounds.hi <= 0 else prim("abs", slope)
 
 
-def _at_root(node: Integral, what: Delta, factor: Term, root: Root) -> Term:
+def _at_root(node: Integral, what: Delta, factor: Term, root: SurfaceRoot) -> Term:
     place = {root.variable: root.at}
     _check_single(factor, what, root)
     slope = substitute(partial(what.coordinates[0], root.variable), place)

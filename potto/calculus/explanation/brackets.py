@@ -1,6 +1,6 @@
 """Iverson brackets as conditions, in as few and as plain comparisons as they can be told.
 
-Owns `Condition`, `conditions`, `fewer`, `between`, `plainer`, `sign_where`, `constant`, `bracket`. A root is compared
+Owns `Inequality`, `conditions`, `fewer`, `between`, `plainer`, `sign_where`, `constant`, `bracket`. A root is compared
 by squares or by what it is the root of, factors that do not change a sign are left out, and so is what another
 condition implies. What two conditions hold between numbers stands between them: `-1 < c + x < 0` is c < -x and
 c + x + 1 > 0.
@@ -40,37 +40,37 @@ _MONOMIALS = 6  # of what is written anew between its bounds
 _COEFFICIENT = 64  # the largest; multiples of decimal fractions are no plainer
 
 
-class Condition(Struct, frozen=True):
+class Inequality(Struct, frozen=True):
     """surface > 0, or >= 0."""
 
     surface: Term
     strict: bool
 
 
-NEVER = Condition(const(-1.0), True)
+NEVER = Inequality(const(-1.0), True)
 
 
-def conditions(term: Term) -> list[Condition] | None:
+def conditions(term: Term) -> list[Inequality] | None:
     """The conditions under all of which a term is 1, if it is 0 elsewhere."""
-    found: list[Condition] = []
+    found: list[Inequality] = []
     while term is not ONE:
         if not isinstance(term, Branch) or (len(term.coordinates) > 1 and not term.strict):
             return None
         if term.orelse is ZERO:
-            found.append(Condition(term.surface, term.strict))
+            found.append(Inequality(term.surface, term.strict))
             term = term.then
         elif term.then is ZERO:
-            found.append(Condition(neg(term.surface), not term.strict))
+            found.append(Inequality(neg(term.surface), not term.strict))
             term = term.orelse
         else:
             return None
     return found
 
 
-def fewer(known: Iterable[Condition], box: Box = _ANYWHERE) -> list[Condition]:
+def fewer(known: Iterable[Inequality], box: Box = _ANYWHERE) -> list[Inequality]:
     """The same conditions without what is said twice or follows from another one; of two that exclude each other none
     is left but that which never holds. box: the ranges of variables."""
-    found: list[Condition] = []
+    found: list[Inequality] = []
     for item in known:
         for plain in _plain(item, box):
             if any(_excludes(other, plain) for other in found):
@@ -81,7 +81,7 @@ def fewer(known: Iterable[Condition], box: Box = _ANYWHERE) -> list[Condition]:
     return found
 
 
-def bracket(known: Sequence[Condition]) -> Term:
+def bracket(known: Sequence[Inequality]) -> Term:
     """1 where all conditions hold, else 0."""
     whole: Term = ONE
     for item in between(known):  # the last one is the first that is asked
@@ -99,11 +99,11 @@ class _Bound(Struct, frozen=True):
     scaled: bool
 
 
-def between(known: Sequence[Condition]) -> list[Condition]:
+def between(known: Sequence[Inequality]) -> list[Inequality]:
     """The same conditions: two bounds of one thing alike and beside each other, so that it stands between them, the
     lower one last, which is asked first; and none of a fraction of anything."""
     bounds = [_bound(item.surface) for item in known]
-    found: list[Condition] = []
+    found: list[Inequality] = []
     done: set[int] = set()
     for i, bound in enumerate(bounds):
         if i in done:
@@ -112,7 +112,7 @@ def between(known: Sequence[Condition]) -> list[Condition]:
         surfaces = {j: _surface(b) for j, b in alike if b.scaled or len(alike) > 1}
         for j in [j for j, b in alike if b.turned] + [j for j, b in alike if not b.turned] or [i]:
             surface = surfaces.get(j)
-            found.append(known[j] if surface is None else Condition(surface, known[j].strict))
+            found.append(known[j] if surface is None else Inequality(surface, known[j].strict))
             done.add(j)
     return found
 
@@ -167,12 +167,12 @@ def plainer(surface: Term, box: Box) -> Term | None:
     return top if below is ONE else div(top, below)
 
 
-def sign_where(known: Sequence[Condition], inner: Term) -> tuple[int, list[Condition]] | None:
+def sign_where(known: Sequence[Inequality], inner: Term) -> tuple[int, list[Inequality]] | None:
     """The sign of `inner` where the conditions hold, if they tell it, and the conditions without the places where it is
     0: sign(a)*[a >= 0] is [a > 0]."""
     for i, item in enumerate(known):
         for turned, signed in ((1, inner), (-1, neg(inner))):
-            positive, strict = Condition(signed, True), Condition(item.surface, True)
+            positive, strict = Inequality(signed, True), Inequality(item.surface, True)
             if _implies(strict, positive):
                 own = item if _implies(item, positive) else strict
                 return turned, [*known[:i], own, *known[i + 1 :]]
@@ -187,13 +187,13 @@ def constant(term: Term) -> Fraction | None:
     return Fraction(found.top.get((), 0)) / Fraction(found.below[()])
 
 
-def opposite(first: Condition, second: Condition) -> bool:
+def opposite(first: Inequality, second: Inequality) -> bool:
     """Whether one surface is the other with its sign turned."""
     found = normal(add(first.surface, second.surface))
     return first.strict and second.strict and found is not None and not found.top
 
 
-def _plain(item: Condition, box: Box) -> list[Condition]:
+def _plain(item: Inequality, box: Box) -> list[Inequality]:
     """A condition as conditions without roots, and without factors whose sign is known; none if it always holds."""
     found = normal(item.surface)
     if found is None:
@@ -212,7 +212,7 @@ def _plain(item: Condition, box: Box) -> list[Condition]:
     return [item]
 
 
-def _squared(form: Polynomial, strict: bool, box: Box) -> list[Condition] | None:
+def _squared(form: Polynomial, strict: bool, box: Box) -> list[Inequality] | None:
     """k*sqrt(u) + rest > 0 by squares, where the sign of the rest is known."""
     roots = [(m, c) for m, c in form.items() if any(isinstance(a, Prim) and a.op == "sqrt" for a, _ in m)]
     if len(roots) != 1:
@@ -227,21 +227,21 @@ def _squared(form: Polynomial, strict: bool, box: Box) -> list[Condition] | None
     rest = as_term({m: Fraction(c / size) for m, c in form.items() if m != monomial})
     if rest is None:
         return None
-    exists = Condition(inside, False)
+    exists = Inequality(inside, False)
     if scale < 0:  # sqrt(u) < rest
         return (
-            [exists, Condition(written_out(sub(mul(rest, rest), inside)), strict)]
+            [exists, Inequality(written_out(sub(mul(rest, rest), inside)), strict)]
             if range_of(rest, box).lo >= 0
             else None
         )
     if rest is ZERO:
-        return [Condition(inside, strict)]
+        return [Inequality(inside, strict)]
     if range_of(rest, box).lo >= 0:
         return [exists]
-    return [Condition(written_out(sub(inside, mul(rest, rest))), strict)] if range_of(rest, box).hi <= 0 else None
+    return [Inequality(written_out(sub(inside, mul(rest, rest))), strict)] if range_of(rest, box).hi <= 0 else None
 
 
-def _odd_root(form: Polynomial, strict: bool) -> list[Condition] | None:
+def _odd_root(form: Polynomial, strict: bool) -> list[Inequality] | None:
     """k*sign(u)*abs(u)^(1/n) > a number, by u itself."""
     offset = form.get((), Fraction(0))
     match [(monomial, scale) for monomial, scale in form.items() if monomial]:
@@ -257,7 +257,7 @@ def _odd_root(form: Polynomial, strict: bool) -> list[Condition] | None:
     bound = None if part is None or part.numerator != 1 else number(value * abs(value) ** (part.denominator - 1))
     if bound is None:
         return None
-    return [Condition(sub(u, bound) if scale > 0 else sub(bound, u), strict)]
+    return [Inequality(sub(u, bound) if scale > 0 else sub(bound, u), strict)]
 
 
 def written_out(term: Term) -> Term:
@@ -267,11 +267,11 @@ def written_out(term: Term) -> Term:
     return term if written is None else written
 
 
-def _without_even(item: Condition, top: Polynomial, below: Polynomial, box: Box) -> list[Condition]:
+def _without_even(item: Inequality, top: Polynomial, below: Polynomial, box: Box) -> list[Inequality]:
     """Of a product only the factors that change its sign."""
     ((monomial, scale),) = top.items()
     if not item.strict and not set(below) - {()} and len(monomial) == 1 and monomial[0][1] == 1:
-        return [Condition(monomial[0][0] if scale > 0 else neg(monomial[0][0]), False)]
+        return [Inequality(monomial[0][0] if scale > 0 else neg(monomial[0][0]), False)]
     if len(below) != 1 or not item.strict:
         return [item]
     ((under, _),) = below.items()
@@ -279,10 +279,10 @@ def _without_even(item: Condition, top: Polynomial, below: Polynomial, box: Box)
     if not odd:
         return [] if scale > 0 else [NEVER]
     whole = mul(*odd)
-    return [Condition(whole if scale > 0 else neg(whole), item.strict)]
+    return [Inequality(whole if scale > 0 else neg(whole), item.strict)]
 
 
-def _excludes(first: Condition, second: Condition) -> bool:
+def _excludes(first: Inequality, second: Inequality) -> bool:
     """Whether two conditions never hold together: their surfaces add up to a number that is not above 0."""
     total = constant(add(first.surface, second.surface))
     if total is None:
@@ -290,7 +290,7 @@ def _excludes(first: Condition, second: Condition) -> bool:
     return total < 0 or (total == 0 and (first.strict or second.strict))
 
 
-def _implies(first: Condition, second: Condition) -> bool:
+def _implies(first: Inequality, second: Inequality) -> bool:
     """Whether the second holds wherever the first does: its surface is the other's and what is never below 0."""
     more = range_of(written_out(sub(second.surface, first.surface)))
     return more.lo > 0 or (more.lo == 0 and (first.strict or not second.strict))

@@ -23,10 +23,10 @@ from potto.calculus.explanation.continuity import continuous
 from potto.calculus.explanation.fields import fields_of
 from potto.calculus.explanation.layout import DerivativeText, IntegralText, SurfaceText
 from potto.calculus.explanation.plain_names import plainly_named
-from potto.calculus.explanation.readable import Progress, in_decimals, readable
+from potto.calculus.explanation.readable import ReadableParts, in_decimals, readable
 from potto.calculus.explanation.symbols import NoFormula, Rewrite, Words, over_functions
 from potto.calculus.inlining.expand import Resolve, heads_of
-from potto.calculus.solving.pivots import NoClosedForm, Root, pivots
+from potto.calculus.solving.pivots import NoClosedForm, SurfaceRoot, pivots
 from potto.calculus.solving.solve import factors
 from potto.calculus.surfaces.branch_assignment import box_of, branches_of, with_index
 from potto.calculus.surfaces.branch_assignment import unguarded as where_it_exists
@@ -137,7 +137,7 @@ def describe(
         fields,
         frozenset(params) | {f"d{p}" for p in params},
         frozenset(f"d{p}" for p in params),
-        Progress(pause),
+        ReadableParts(pause),
     )
     tangents: dict[str, Term] = {p: var(f"d{p}") for p in params}
     work = Differentiator(resolve, folding=True)
@@ -319,7 +319,7 @@ def _surfaces(node: Integral, tangents: Mapping[str, Term], words: Words) -> tup
     return tuple(found.values())
 
 
-def _root(root: Root, words: Words) -> str:
+def _root(root: SurfaceRoot, words: Words) -> str:
     """A root where it exists; of many that recur, with the name of their index."""
     at = where_it_exists(root.at)
     index = root.index and stem(root.index)

@@ -12,7 +12,7 @@ from fractions import Fraction
 from msgspec import Struct
 
 from potto.calculus.algebra.ranges import range_of
-from potto.calculus.explanation.brackets import NEVER, Condition, bracket, conditions, constant, fewer, sign_where
+from potto.calculus.explanation.brackets import NEVER, Inequality, bracket, conditions, constant, fewer, sign_where
 from potto.core.polynomials import number
 from potto.core.printer import format_term
 from potto.core.terms import (
@@ -49,7 +49,7 @@ class Factors(Struct):
     coefficient: Fraction = Fraction(1)
     powers: dict[Term, Fraction] = {}
     exponents: list[Term] = []
-    conditions: list[Condition] = []
+    conditions: list[Inequality] = []
 
     def times(self, base: Term, exponent: Fraction) -> None:
         """One more factor."""

@@ -13,10 +13,10 @@ from math import gcd, inf, isfinite, isqrt, lcm, prod, ulp
 
 from msgspec import Struct
 
-from potto.calculus.algebra.ranges import Box, Range, range_of
+from potto.calculus.algebra.ranges import Box, ValueRange, range_of
 from potto.calculus.algebra.rational_form import Rational, normal
 from potto.calculus.explanation.alternatives import in_one
-from potto.calculus.explanation.brackets import Condition, between, conditions, fewer, opposite, plainer
+from potto.calculus.explanation.brackets import Inequality, between, conditions, fewer, opposite, plainer
 from potto.calculus.explanation.brackets import bracket as bracket_of
 from potto.calculus.explanation.factors import Factors, factored, is_tangent, written
 from potto.calculus.surfaces.branch_assignment import box_of, with_index
@@ -64,7 +64,7 @@ _TANGENT = 4  # how much longer a formula seems for each tangent that it names
 _SUM = "sum'"  # the name of a sum while it is not taken apart: one that nobody can write
 
 
-class Progress(Struct):
+class ReadableParts(Struct):
     """Of formulas that are written one after the other. known: what was found for a part of one, by all that this
     depends on; pause: called before each new part, may raise what ends it."""
 
@@ -72,12 +72,14 @@ class Progress(Struct):
     known: dict[tuple[Term, frozenset[str], frozenset[str]], Term] = {}
 
 
-def readable(term: Term, tangents: frozenset[str], box: Box | None = None, progress: Progress | None = None) -> Term:
+def readable(
+    term: Term, tangents: frozenset[str], box: Box | None = None, progress: ReadableParts | None = None
+) -> Term:
     """The same value, written to be read; `tangents`: the names by which it is linear, `box`: the ranges of its
     variables."""
     if LEFT_OUT in format_term(term, _LONG):
         return term
-    work = _Work(tangents, _bound(term) | frozenset(box or ()), progress or Progress())
+    work = _Work(tangents, _bound(term) | frozenset(box or ()), progress or ReadableParts())
     return _decided(transform(term, lambda _, new: work.node(new)), box or {}, work)
 
 
@@ -161,7 +163,7 @@ def _undecided(node: Term, known: Mapping[Term, Term], box: Box, work: _Work) ->
     return new if new is node else work.node(new)
 
 
-def _taken(node: Branch, bounds: Range) -> Term | None:
+def _taken(node: Branch, bounds: ValueRange) -> Term | None:
     """The side of a branch whose surface has these bounds, where they tell."""
     if bounds.positive or (not node.strict and bounds.lo >= 0):
         return node.then
@@ -169,7 +171,7 @@ def _taken(node: Branch, bounds: Range) -> Term | None:
 
 
 class _Work:
-    def __init__(self, tangents: frozenset[str], inside: frozenset[str], progress: Progress) -> None:
+    def __init__(self, tangents: frozenset[str], inside: frozenset[str], progress: ReadableParts) -> None:
         self.progress = progress
         self.tangents = tangents
         self.inside = inside  # variables of integration, on which no `sign` may depend
@@ -194,7 +196,7 @@ class _Work:
                     return bracket_of(fewer(known))
                 if len(node.coordinates) > 1:
                     return in_one(node, self.tangents, self.inside, self._cost)
-                (item,) = between([Condition(node.surface, node.strict)])
+                (item,) = between([Inequality(node.surface, node.strict)])
                 whole = branch((item.surface,), item.strict, node.then, node.orelse)
                 return in_one(whole, self.tangents, self.inside, self._cost) if isinstance(whole, Branch) else whole
             case If():

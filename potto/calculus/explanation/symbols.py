@@ -12,7 +12,7 @@ from msgspec import Struct
 
 from potto.calculus.algebra.radicals import NAN
 from potto.calculus.algebra.ranges import Box
-from potto.calculus.explanation.readable import Progress, in_decimals, readable
+from potto.calculus.explanation.readable import ReadableParts, in_decimals, readable
 from potto.calculus.surfaces.trace import spine
 from potto.core.printer import LEFT_OUT, format_term
 from potto.core.simplify import simplify
@@ -60,7 +60,7 @@ class Words(Struct, frozen=True):
     fields: Rewrite
     names: frozenset[str]
     tangents: frozenset[str]
-    progress: Progress
+    progress: ReadableParts
 
     def plain(self, term: Term) -> str:
         """A term as it is written, parts of records by their names."""

@@ -1,7 +1,7 @@
 """Terms that are the same but for their numbers: one term over parameters, and what these are in each.
 
-Owns `alike` and `Alike`. Numbers and names stand for each other where they are what differs. What is the same in all
-stays as it is, since a closed form may rest on it; so does what decides exponents, recursions, how long a sum is.
+Owns `alike` and `SameShape`. Numbers and names stand for each other where they are what differs. What is the same in
+all stays as it is, since a closed form may rest on it; so does what decides exponents, recursions, how long a sum is.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ MOST_PARTS = 4096
 Leaf = Const | Var
 
 
-class Alike(Struct, frozen=True):
+class SameShape(Struct, frozen=True):
     """Terms of one shape. function: what they have in common, over parameters. columns: per parameter what it is in
     each of them, or the one name that it is in all. places: which terms they are."""
 
@@ -48,7 +48,7 @@ class Alike(Struct, frozen=True):
     places: tuple[int, ...]
 
 
-def alike(terms: Sequence[Term], kinds: Mapping[str, object], resolve: Resolve) -> tuple[list[Alike], list[int]]:
+def alike(terms: Sequence[Term], kinds: Mapping[str, object], resolve: Resolve) -> tuple[list[SameShape], list[int]]:
     """The groups of two and more terms that are alike, and the places of those that are like no other.
 
     kinds: of the free names those that are made of numbers, with how; only they can differ.
@@ -61,7 +61,7 @@ def alike(terms: Sequence[Term], kinds: Mapping[str, object], resolve: Resolve) 
             alone.append(place)
         else:
             shapes.setdefault(found[0], []).append((place, found[1]))
-    groups: list[Alike] = []
+    groups: list[SameShape] = []
     for members in shapes.values():
         parts = [members]
         if len(members) > 1:
@@ -125,7 +125,7 @@ def _head(node: Term) -> object:
             return (type(node), below) if below else node
 
 
-def _common(term: Term, kinds: Mapping[str, object], members: Sequence[tuple[int, Sequence[Leaf]]]) -> Alike:
+def _common(term: Term, kinds: Mapping[str, object], members: Sequence[tuple[int, Sequence[Leaf]]]) -> SameShape:
     """What members of one shape have in common: the shape of `term`, one of them."""
     names: dict[tuple[Leaf, ...], str] = {}
     leaves: list[Term] = []
@@ -137,7 +137,7 @@ def _common(term: Term, kinds: Mapping[str, object], members: Sequence[tuple[int
     whole = _filled(term, kinds, leaves)
     given = {name: column for column, name in names.items()}
     params = tuple(sorted(whole.free))
-    return Alike(lam(params, whole), tuple(given.get(p, p) for p in params), tuple(place for place, _ in members))
+    return SameShape(lam(params, whole), tuple(given.get(p, p) for p in params), tuple(place for place, _ in members))
 
 
 def _filled(term: Term, kinds: Mapping[str, object], leaves: Sequence[Term]) -> Term:
@@ -151,7 +151,7 @@ def _filled(term: Term, kinds: Mapping[str, object], leaves: Sequence[Term]) -> 
 
 
 def _as_they_decide(
-    whole: Alike, members: Sequence[tuple[int, list[Leaf]]], resolve: Resolve
+    whole: SameShape, members: Sequence[tuple[int, list[Leaf]]], resolve: Resolve
 ) -> list[list[tuple[int, list[Leaf]]]]:
     """Members apart that differ in what decides which formulas they are."""
     decide = deciding([whole.function.body], resolve, exponents=True)

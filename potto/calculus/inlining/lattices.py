@@ -57,7 +57,7 @@ def middle(term: Sum) -> Term | None:
     return found if sub(found, var(term.variable)) is factor.args[0] else None
 
 
-class Walk(Struct, frozen=True):
+class LatticeWalk(Struct, frozen=True):
     """A look-up along a variable: at the place `slope * x + start` of a lattice.
 
     cells: of a place on a border the cell above, and that below it. border: between a cell and the one before it, by
@@ -113,7 +113,7 @@ def _by_cells(term: Integral, varying: frozenset[str]) -> Term:
     return sum_(step, ZERO, count, _by_cells(inside, varying | {step}))
 
 
-def _course(walk: Walk, low: Term, high: Term) -> tuple[Term, Term, Term]:
+def _course(walk: LatticeWalk, low: Term, high: Term) -> tuple[Term, Term, Term]:
     """Whether places rise on the way, how many borders between cells are crossed, and the cell that it begins in."""
     (above, below), (above_last, below_last) = walk.cells(walk.place(low)), walk.cells(walk.place(high))
     rising = prim("le", above, above_last)
@@ -127,7 +127,7 @@ def _exact(place: Term, last: Term) -> Term:
     return index(array(slot, add(last, const(2)), sub(var(slot), ONE)), add(place, ONE))
 
 
-def _walk(term: Integral, varying: frozenset[str]) -> Walk | None:
+def _walk(term: Integral, varying: frozenset[str]) -> LatticeWalk | None:
     """A look-up in an integrand along a variable with plain bounds, at places in proportion to it."""
     for node in postorder(term.body):
         if not isinstance(node, Sum) or node.lo is not ZERO:
@@ -140,11 +140,11 @@ def _walk(term: Integral, varying: frozenset[str]) -> Walk | None:
         low, high = term.bounds[term.variables.index(variable)]
         line = affine(found[0], (variable,))
         if line is not None and varying.isdisjoint(low.free | high.free):
-            return Walk(variable, line.coefficients[0], line.rest, *found[1:])
+            return LatticeWalk(variable, line.coefficients[0], line.rest, *found[1:])
     return None
 
 
-def _inside(body: Term, walk: Walk, cell: Term) -> Term:
+def _inside(body: Term, walk: LatticeWalk, cell: Term) -> Term:
     """An integrand where the look-up is in one cell."""
     place = walk.place(var(walk.variable))
 

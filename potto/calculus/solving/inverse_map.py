@@ -37,7 +37,7 @@ MOST_BRANCHES = 16
 _EFFORT = 200
 
 
-class Inverse(Struct, frozen=True):
+class InverseMap(Struct, frozen=True):
     """The variables over the coordinates' values `values`; several branches where the map folds.
 
     determinant: of the derivative of the coordinates by the variables, over the variables.
@@ -64,7 +64,7 @@ def jacobian(coordinates: Sequence[Term], variables: Sequence[str]) -> tuple[tup
     return tuple(tuple(partial(c, v) for v in variables) for c in coordinates)
 
 
-def invert(coordinates: Sequence[Term], variables: Sequence[str], selected: bool = False) -> Inverse | Failure:
+def invert(coordinates: Sequence[Term], variables: Sequence[str], selected: bool = False) -> InverseMap | Failure:
     """The inverse of a map of as many coordinates as variables.
 
     `selected`: a declared branch selects one of several solutions, so periodic ones may be tried one by one.
@@ -82,7 +82,7 @@ def invert(coordinates: Sequence[Term], variables: Sequence[str], selected: bool
     method, branches = search.solve(tuple(coordinates), tuple(var(v) for v in values), tuple(variables))
     if branches is None:
         return Failure(search.reason or "no inverse was found", False, det)
-    return Inverse(tuple(variables), tuple(values), branches, det, method)
+    return InverseMap(tuple(variables), tuple(values), branches, det, method)
 
 
 def _names(count: int) -> list[str]:

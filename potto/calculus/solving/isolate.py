@@ -47,7 +47,7 @@ class Guard(Struct, frozen=True):
     strict: bool = False
 
 
-class Step(Struct, frozen=True):
+class IsolationStep(Struct, frozen=True):
     """One equation `inner = value` that the step leads to. With `period` set, also value + k period for integers k."""
 
     inner: Term
@@ -62,7 +62,7 @@ class Stuck(Struct, frozen=True):
     reason: str
 
 
-Steps = tuple[Step, ...] | Stuck
+Steps = tuple[IsolationStep, ...] | Stuck
 
 
 def step(term: Prim, index: int, value: Term) -> Steps:
@@ -77,24 +77,24 @@ def step(term: Prim, index: int, value: Term) -> Steps:
 
 
 def _add(args: tuple[Term, ...], index: int, value: Term) -> Steps:
-    return (Step(args[index], add(value, *(minus(a) for i, a in enumerate(args) if i != index))),)
+    return (IsolationStep(args[index], add(value, *(minus(a) for i, a in enumerate(args) if i != index))),)
 
 
 def _neg(args: tuple[Term, ...], index: int, value: Term) -> Steps:
-    return (Step(args[0], minus(value)),)
+    return (IsolationStep(args[0], minus(value)),)
 
 
 def _mul(args: tuple[Term, ...], index: int, value: Term) -> Steps:
     if value is ZERO:
-        return (Step(args[index], ZERO),)
-    return (Step(args[index], quotient(value, mul(*(a for i, a in enumerate(args) if i != index)))),)
+        return (IsolationStep(args[index], ZERO),)
+    return (IsolationStep(args[index], quotient(value, mul(*(a for i, a in enumerate(args) if i != index)))),)
 
 
 def _div(args: tuple[Term, ...], index: int, value: Term) -> Steps:
     top, bottom = args
     if index == 0:
-        return (Step(top, mul(value, bottom)),)
-    return () if value is ZERO else (Step(bottom, quotient(top, value)),)
+        return (IsolationStep(top, mul(value, bottom)),)
+    return () if value is ZERO else (IsolationStep(bottom, quotient(top, value)),)
 
 
 def _pow(args: tuple[Term, ...], index: int, value: Term) -> Steps:
@@ -102,7 +102,7 @@ def _pow(args: tuple[Term, ...], index: int, value: Term) -> Steps:
     if index == 1:
         if value is ZERO:
             return ()
-        return (Step(exponent, div(prim("log", value), prim("log", base))),)
+        return (IsolationStep(exponent, div(prim("log", value), prim("log", base))),)
     if isinstance(exponent, Const):
         return _constant_power(base, exponent.value, value)
     return _symbolic_power(base, exponent, value)
@@ -115,30 +115,30 @@ def _constant_power(base: Term, power: float, value: Term) -> Steps:
         return () if value is ZERO else _constant_power(base, -power, div(ONE, value))
     if not power.is_integer():
         if value is ZERO:
-            return (Step(base, ZERO),)
+            return (IsolationStep(base, ZERO),)
         back = 1 / power
         exponent = const(back) if back.is_integer() else div(ONE, const(power))
-        return (Step(base, pow_(guarded(value, value), exponent)),)
+        return (IsolationStep(base, pow_(guarded(value, value), exponent)),)
     if int(power) % 2:
-        return (Step(base, odd_root(value, int(power))),)
+        return (IsolationStep(base, odd_root(value, int(power))),)
     if value is ZERO:
-        return (Step(base, ZERO),)
+        return (IsolationStep(base, ZERO),)
     root = even_root(value, int(power))
-    return (Step(base, neg(root)), Step(base, root))
+    return (IsolationStep(base, neg(root)), IsolationStep(base, root))
 
 
 def _symbolic_power(base: Term, exponent: Term, value: Term) -> Steps:
     """u^p = y for a p known at run time only: the positive root, and negative ones where p is an integer."""
     if value is ZERO:
-        return (Step(base, guarded(exponent, ZERO, strict=True)),)
+        return (IsolationStep(base, guarded(exponent, ZERO, strict=True)),)
     inverse = div(ONE, exponent)
     up = prim("pow", value, inverse)
     down, odd = neg(up), neg(prim("pow", neg(value), inverse))
     # (-u)^p is nan unless p is an integer, and has the sign of y for an even p only (for an odd p when y < 0).
     return (
-        Step(base, guarded(value, up)),
-        Step(base, guarded(mul(prim("pow", down, exponent), value), down, strict=True)),
-        Step(base, guarded(mul(prim("pow", odd, exponent), value), odd, strict=True)),
+        IsolationStep(base, guarded(value, up)),
+        IsolationStep(base, guarded(mul(prim("pow", down, exponent), value), down, strict=True)),
+        IsolationStep(base, guarded(mul(prim("pow", odd, exponent), value), odd, strict=True)),
     )
 
 
@@ -147,43 +147,43 @@ def _symbolic_power(base: Term, exponent: Term, value: Term) -> Steps:
 
 def _abs(args: tuple[Term, ...], index: int, value: Term) -> Steps:
     if value is ZERO:
-        return (Step(args[0], ZERO),)
+        return (IsolationStep(args[0], ZERO),)
     root = guarded(value, value)
-    return (Step(args[0], neg(root)), Step(args[0], root))
+    return (IsolationStep(args[0], neg(root)), IsolationStep(args[0], root))
 
 
 def _sqrt(args: tuple[Term, ...], index: int, value: Term) -> Steps:
     if value is ZERO:
-        return (Step(args[0], ZERO),)
+        return (IsolationStep(args[0], ZERO),)
     if isinstance(value, Prim) and value.op == "sqrt":
-        return (Step(args[0], value.args[0], (Guard(value.args[0]),)),)
-    return (Step(args[0], guarded(value, pow_(value, TWO))),)
+        return (IsolationStep(args[0], value.args[0], (Guard(value.args[0]),)),)
+    return (IsolationStep(args[0], guarded(value, pow_(value, TWO))),)
 
 
 def _exp(args: tuple[Term, ...], index: int, value: Term) -> Steps:
     if value is ZERO or range_of(value).hi <= 0:
         return ()
     if isinstance(value, Prim) and value.op == "exp":
-        return (Step(args[0], value.args[0]),)
-    return (Step(args[0], ZERO if value is ONE else prim("log", value)),)
+        return (IsolationStep(args[0], value.args[0]),)
+    return (IsolationStep(args[0], ZERO if value is ONE else prim("log", value)),)
 
 
 def _log(args: tuple[Term, ...], index: int, value: Term) -> Steps:
     if isinstance(value, Prim) and value.op == "log":
-        return (Step(args[0], value.args[0], (Guard(value.args[0], strict=True),)),)
-    return (Step(args[0], ONE if value is ZERO else prim("exp", value)),)
+        return (IsolationStep(args[0], value.args[0], (Guard(value.args[0], strict=True),)),)
+    return (IsolationStep(args[0], ONE if value is ZERO else prim("exp", value)),)
 
 
 def _hypot(args: tuple[Term, ...], index: int, value: Term) -> Steps:
     other = args[1 - index]
     root = guarded(value, prim("sqrt", mul(sub(value, other), add(value, other))))
-    return (Step(args[index], neg(root)), Step(args[index], root))
+    return (IsolationStep(args[index], neg(root)), IsolationStep(args[index], root))
 
 
 def _extreme(sign: Callable[[Term], Term]) -> Callable[[tuple[Term, ...], int, Term], Steps]:
     def run(args: tuple[Term, ...], index: int, value: Term) -> Steps:
         guards = tuple(Guard(sign(sub(value, a))) for i, a in enumerate(args) if i != index)
-        return (Step(args[index], value, guards),)
+        return (IsolationStep(args[index], value, guards),)
 
     return run
 
@@ -191,10 +191,10 @@ def _extreme(sign: Callable[[Term], Term]) -> Callable[[tuple[Term, ...], int, T
 def _clamp(args: tuple[Term, ...], index: int, value: Term) -> Steps:
     x, lo, hi = args
     if index == 0:
-        return (Step(x, value, (Guard(sub(value, lo), True), Guard(sub(hi, value), True))),)
+        return (IsolationStep(x, value, (Guard(sub(value, lo), True), Guard(sub(hi, value), True))),)
     if index == 1:
-        return (Step(lo, value, (Guard(sub(value, x)), Guard(sub(hi, value), True))),)
-    return (Step(hi, value, (Guard(sub(x, value)), Guard(sub(value, lo), True))),)
+        return (IsolationStep(lo, value, (Guard(sub(value, x)), Guard(sub(hi, value), True))),)
+    return (IsolationStep(hi, value, (Guard(sub(x, value)), Guard(sub(value, lo), True))),)
 
 
 def _atan2(args: tuple[Term, ...], index: int, value: Term) -> Steps:
@@ -202,11 +202,11 @@ def _atan2(args: tuple[Term, ...], index: int, value: Term) -> Steps:
     within = (Guard(sub(PI, value)), Guard(add(PI, value)))
     if index == 0:
         if value is ZERO:
-            return (Step(y, ZERO, (Guard(x, True),)),)
-        return (Step(y, mul(x, prim("tan", value)), (*within, Guard(mul(x, prim("cos", value)), True))),)
+            return (IsolationStep(y, ZERO, (Guard(x, True),)),)
+        return (IsolationStep(y, mul(x, prim("tan", value)), (*within, Guard(mul(x, prim("cos", value)), True))),)
     if value is ZERO:
         return ()
-    return (Step(x, div(y, prim("tan", value)), (*within, Guard(mul(y, prim("sin", value)), True))),)
+    return (IsolationStep(x, div(y, prim("tan", value)), (*within, Guard(mul(y, prim("sin", value)), True))),)
 
 
 def _registered(op: str, args: tuple[Term, ...], index: int, value: Term) -> Steps:
@@ -214,7 +214,7 @@ def _registered(op: str, args: tuple[Term, ...], index: int, value: Term) -> Ste
     entry = PRIMITIVES.get(op)
     written = _written_out(op, args, index)
     if written is not None:
-        return (Step(written, value),)
+        return (IsolationStep(written, value),)
     if entry is None or len(args) != 1:
         return Stuck(f"`{op}` has no inverse")
     (inner,) = args
@@ -222,16 +222,16 @@ def _registered(op: str, args: tuple[Term, ...], index: int, value: Term) -> Ste
         return ()
     one_to_one = entry.increasing != 0
     if one_to_one and isinstance(value, Prim) and value.op == op and not entry.edges(inner):
-        return (Step(inner, value.args[0]),)
+        return (IsolationStep(inner, value.args[0]),)
     if value is ZERO and entry.roots == (0.0,):
-        return (Step(inner, ZERO, (), entry.period(value)[0] if entry.period else None),)
+        return (IsolationStep(inner, ZERO, (), entry.period(value)[0] if entry.period else None),)
     if entry.inverse is None:
         return Stuck(f"`{op}` has no inverse in closed form")
     solutions = tuple(_folded(s) for s in entry.inverse(value))
     if entry.period is None:
-        return tuple(Step(inner, s) for s in solutions)
+        return tuple(IsolationStep(inner, s) for s in solutions)
     period, further = entry.period(value)
-    return tuple(Step(inner, s, (), period) for s in (*solutions, *further))
+    return tuple(IsolationStep(inner, s, (), period) for s in (*solutions, *further))
 
 
 def _written_out(op: str, args: tuple[Term, ...], index: int) -> Term | None:
@@ -262,7 +262,7 @@ def _turn(start: Term) -> Callable[[tuple[Term, ...], int, Term], Steps]:
 
     def run(args: tuple[Term, ...], index: int, value: Term) -> Steps:
         if value is ZERO:
-            return (Step(args[0], start, (), PI),)
+            return (IsolationStep(args[0], start, (), PI),)
         return _registered("sin" if start is ZERO else "cos", args, 0, value)
 
     return run

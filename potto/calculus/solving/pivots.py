@@ -22,7 +22,7 @@ class NoClosedForm(Exception):
     """A boundary that cannot be written with the builtins; evaluation finds it by numbers."""
 
 
-class Root(Struct, frozen=True):
+class SurfaceRoot(Struct, frozen=True):
     """A root of a surface in a variable of integration; `index` and `counts` when it is one of a periodic family."""
 
     variable: str
@@ -34,7 +34,7 @@ class Root(Struct, frozen=True):
 class Pivot(Struct, frozen=True):
     """The roots of a surface in one variable of integration; taken where the plain `condition` holds."""
 
-    roots: list[Root]
+    roots: list[SurfaceRoot]
     condition: Term | None = None
 
 
@@ -68,7 +68,7 @@ def pivots(node: Integral, surface: Term, folding: bool = True) -> list[Pivot]:
 _STEEP = 8.0  # a slope this much smaller than the largest one is still fine to divide by
 
 
-def _solved(node: Integral, surface: Term, order: Sequence[str], folding: bool = True) -> list[Root]:
+def _solved(node: Integral, surface: Term, order: Sequence[str], folding: bool = True) -> list[SurfaceRoot]:
     reasons: list[str] = []
     for name in order:
         found = sections(surface, name)
@@ -78,7 +78,7 @@ def _solved(node: Integral, surface: Term, order: Sequence[str], folding: bool =
         elif isinstance(found, Sections) and _is_a_factor(node, surface, name, found):
             reasons.append(f"another part of it may run along `{name}`")
         elif isinstance(found, Sections) and found.complete:
-            roots = [Root(name, r) for r in (*found.roots, *found.poles)]
+            roots = [SurfaceRoot(name, r) for r in (*found.roots, *found.poles)]
             position = node.variables.index(name)
             return roots + [_family(node, position, f) for f in (*found.families, *found.pole_families)]
         else:
@@ -101,7 +101,7 @@ def chosen(alternatives: Sequence[tuple[Term | None, Term]]) -> Term:
     return result
 
 
-def _family(node: Integral, position: int, family: Family) -> Root:
+def _family(node: Integral, position: int, family: Family) -> SurfaceRoot:
     name, (lo, hi) = node.variables[position], node.bounds[position]
     ends = [substitute(family.inner, {name: end}) for end in (lo, hi)]
     if family.stops:
@@ -111,7 +111,7 @@ def _family(node: Integral, position: int, family: Family) -> Root:
     ends = _corners(node, position, ends)
     lowest, highest = _extreme("min", ends), _extreme("max", ends)
     counts = (_whole("ceil", lowest, 1.0), _whole("floor", highest, 0.0))
-    return Root(name, family.root, family.index, counts)
+    return SurfaceRoot(name, family.root, family.index, counts)
 
 
 def _corners(node: Integral, position: int, ends: list[Term]) -> list[Term]:

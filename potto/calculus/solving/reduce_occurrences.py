@@ -17,7 +17,7 @@ from potto.calculus.algebra.polynomial_in import Collected, collect, dominators
 from potto.calculus.algebra.radicals import TWO, minus, quotient, signed, square_root
 from potto.calculus.algebra.ranges import range_of
 from potto.calculus.algebra.rational_form import is_zero, shorter
-from potto.calculus.solving.isolate import Guard, Step, Steps, Stuck
+from potto.calculus.solving.isolate import Guard, IsolationStep, Steps, Stuck
 from potto.core.terms import (
     ONE,
     PI,
@@ -49,10 +49,10 @@ Degrees = dict[Fraction, Term]
 def split(term: Prim, value: Term, name: str) -> Steps:
     """Equations that together have the roots of `term = value`."""
     if value is ZERO and term.op == "mul":
-        return tuple(Step(factor, ZERO) for factor in term.args if name in factor.free)
+        return tuple(IsolationStep(factor, ZERO) for factor in term.args if name in factor.free)
     if term.op == "div":
         top, below = term.args
-        return (Step(top if value is ZERO else sub(top, mul(value, below)), ZERO),)
+        return (IsolationStep(top if value is ZERO else sub(top, mul(value, below)), ZERO),)
     if term.op in _SPLIT:
         return _SPLIT[term.op](term, value)
     same = _same_builtin(term, value)
@@ -83,7 +83,7 @@ def _same_builtin(term: Prim, value: Term) -> Steps | None:
         return None
     (a,), (b,) = first.args, other.args
     guards = tuple(Guard(edge) for edge in entry.edges(a))
-    return (Step(sub(a, b), ZERO, guards),)
+    return (IsolationStep(sub(a, b), ZERO, guards),)
 
 
 # Polynomials
@@ -101,7 +101,7 @@ def _polynomial_in_something(term: Prim, value: Term, name: str) -> Steps | None
         if steps is not None:
             back = {} if isinstance(inner, Var) else {hidden: inner}
             return tuple(
-                Step(
+                IsolationStep(
                     substitute(s.inner, back),
                     s.value,
                     tuple(Guard(substitute(g.surface, back), g.strict) for g in s.guards),
@@ -121,7 +121,7 @@ def _replaced(term: Term, old: Term, new: Term) -> Term:
     return transform(term, lambda node, made: new if node is old else made, below)
 
 
-def _from_collected(found: Collected, name: str) -> tuple[Step, ...] | None:
+def _from_collected(found: Collected, name: str) -> tuple[IsolationStep, ...] | None:
     found = Collected({m: c for m, c in found.parts.items() if not is_zero(c)})
     atoms = found.atoms
     if not atoms:
@@ -134,23 +134,23 @@ def _from_collected(found: Collected, name: str) -> tuple[Step, ...] | None:
     return _trigonometric(found) or _squared_away(found)
 
 
-def _polynomial(degrees: Degrees, atom: Term) -> tuple[Step, ...] | None:
+def _polynomial(degrees: Degrees, atom: Term) -> tuple[IsolationStep, ...] | None:
     """Roots of a polynomial in one atom, as atom^d = root for the common step d of its degrees."""
     least = min(degrees)
     unit = _common(d - least for d in degrees)
     if unit is None:
-        return None if least == 0 else ((Step(atom, ZERO),) if least > 0 else ())
+        return None if least == 0 else ((IsolationStep(atom, ZERO),) if least > 0 else ())
     if max(degrees) - least > 2 * unit:
         return None
     coefficients = {int((d - least) / unit): shorter(c) for d, c in degrees.items()}
-    steps = [Step(atom, ZERO)] if least > 0 else []
+    steps = [IsolationStep(atom, ZERO)] if least > 0 else []
     inner = atom if unit == 1 else (prim("sqrt", atom) if unit == Fraction(1, 2) else pow_(atom, const(float(unit))))
     highest = max(coefficients)
     if highest == 1:
         roots: tuple[Term, ...] = (quotient(minus(coefficients[0]), coefficients[1]),)
     else:
         roots = quadratic(coefficients[2], coefficients[1], coefficients[0], merging=unit == 1)
-    return (*steps, *(Step(inner, r) for r in roots))
+    return (*steps, *(IsolationStep(inner, r) for r in roots))
 
 
 def _common(differences: Iterable[Fraction]) -> Fraction | None:
@@ -206,13 +206,13 @@ def halved(term: Term) -> Term | None:
 def _fraction(term: Prim, value: Term, name: str) -> Steps | None:
     """The numerator over a common denominator: where that is 0, a pole is met or nothing at all."""
     top = numerator(sub(term, value), name)
-    return None if top is None else (Step(top, ZERO),)
+    return None if top is None else (IsolationStep(top, ZERO),)
 
 
 # Two atoms
 
 
-def _trigonometric(found: Collected) -> tuple[Step, ...] | None:
+def _trigonometric(found: Collected) -> tuple[IsolationStep, ...] | None:
     """Polynomials in sin u and cos u: a sin u + b cos u = c, or one of them after sin^2 + cos^2 = 1."""
     sin = next((a for a in found.atoms if isinstance(a, Prim) and a.op == "sin"), None)
     cos = next((a for a in found.atoms if isinstance(a, Prim) and a.op == "cos"), None)
@@ -225,7 +225,7 @@ def _trigonometric(found: Collected) -> tuple[Step, ...] | None:
         turn, size = prim("atan2", a, b), prim("hypot", a, b)
         swing = prim("acos", quotient(minus(c), size))
         period = mul(TWO, PI)
-        return tuple(Step(sin.args[0], add(turn, s), (), period) for s in (swing, neg(swing)))
+        return tuple(IsolationStep(sin.args[0], add(turn, s), (), period) for s in (swing, neg(swing)))
     for atom, flip in ((cos, False), (sin, True)):
         degrees: dict[Fraction, list[Term]] = {}
         for key, part in table.items():
@@ -241,7 +241,7 @@ def _trigonometric(found: Collected) -> tuple[Step, ...] | None:
     return None
 
 
-def _squared_away(found: Collected) -> tuple[Step, ...] | None:
+def _squared_away(found: Collected) -> tuple[IsolationStep, ...] | None:
     """p + q sqrt(g) = 0 as p^2 - q^2 g = 0, counting only roots where p and q differ in sign."""
     roots = {a for m in found.parts for a, d in m if isinstance(a, Prim) and (a.op == "sqrt" or d.denominator == 2)}
     if len(roots) != 1:
@@ -259,7 +259,7 @@ def _squared_away(found: Collected) -> tuple[Step, ...] | None:
         here = mul(part, *others, pow_(inside, const(int(degree) // 2)) if degree // 2 else ONE)
         (factor if degree % 2 else rest).append(here)
     p, q = add(*rest), add(*factor)
-    return (Step(sub(pow_(p, TWO), mul(pow_(q, TWO), inside)), ZERO, (Guard(neg(mul(p, q))),)),)
+    return (IsolationStep(sub(pow_(p, TWO), mul(pow_(q, TWO), inside)), ZERO, (Guard(neg(mul(p, q))),)),)
 
 
 # Cases
@@ -273,40 +273,40 @@ def _min(term: Prim, value: Term) -> Steps:
     return _pieces(term, value, -1, value)
 
 
-def _pieces(term: Prim, value: Term, sign: int, level: Term | None = None) -> tuple[Step, ...]:
+def _pieces(term: Prim, value: Term, sign: int, level: Term | None = None) -> tuple[IsolationStep, ...]:
     """One step for each argument of min or max, where it is the one that counts (and so equal to `level`).
 
     Where two of them are equal both count: a root at the kink is two roots that meet there.
     """
-    steps: list[Step] = []
+    steps: list[IsolationStep] = []
     for i, piece in enumerate(term.args):
         here = piece if level is None else level
         guards = tuple(
             Guard(sub(here, other) if sign > 0 else sub(other, here)) for j, other in enumerate(term.args) if j != i
         )
-        steps.append(Step(piece, value, guards))
+        steps.append(IsolationStep(piece, value, guards))
     return tuple(steps)
 
 
-def _clamp(term: Prim, value: Term) -> tuple[Step, ...]:
+def _clamp(term: Prim, value: Term) -> tuple[IsolationStep, ...]:
     x, lo, hi = term.args
     return (
-        Step(x, value, (Guard(sub(x, lo)), Guard(sub(hi, x)))),
-        Step(lo, value, (Guard(sub(lo, x)),)),
-        Step(hi, value, (Guard(sub(x, hi)),)),
+        IsolationStep(x, value, (Guard(sub(x, lo)), Guard(sub(hi, x)))),
+        IsolationStep(lo, value, (Guard(sub(lo, x)),)),
+        IsolationStep(hi, value, (Guard(sub(x, hi)),)),
     )
 
 
 def _hypot(term: Prim, value: Term) -> Steps:
     a, b = term.args
-    return (Step(add(pow_(a, TWO), pow_(b, TWO)), pow_(value, TWO), (Guard(value),)),)
+    return (IsolationStep(add(pow_(a, TWO), pow_(b, TWO)), pow_(value, TWO), (Guard(value),)),)
 
 
 def _atan2(term: Prim, value: Term) -> Steps:
     y, x = term.args
     sin, cos = prim("sin", value), prim("cos", value)
     guards = (Guard(add(mul(x, cos), mul(y, sin)), True), Guard(sub(PI, value)), Guard(add(PI, value)))
-    return (Step(sub(mul(y, cos), mul(x, sin)), ZERO, guards),)
+    return (IsolationStep(sub(mul(y, cos), mul(x, sin)), ZERO, guards),)
 
 
 _SPLIT: Mapping[str, Callable[[Prim, Term], Steps]] = {
@@ -325,7 +325,7 @@ def _cases(term: Prim, value: Term, name: str) -> Steps | None:
             continue
         pieces = _pieces_of(node)
         if pieces is not None:
-            return tuple(Step(_replaced(term, node, piece), value, guards) for piece, guards in pieces)
+            return tuple(IsolationStep(_replaced(term, node, piece), value, guards) for piece, guards in pieces)
     return None
 
 

@@ -19,7 +19,7 @@ from potto.calculus.algebra.polynomial_in import collect
 from potto.calculus.algebra.radicals import NAN, guarded
 from potto.calculus.algebra.ranges import positive, range_of, vanishing
 from potto.calculus.algebra.rational_form import settled, shorter
-from potto.calculus.solving.isolate import Guard, Step, Stuck, step
+from potto.calculus.solving.isolate import Guard, IsolationStep, Stuck, step
 from potto.calculus.solving.reduce_occurrences import split
 from potto.core.normal_form import as_term, normal_form
 from potto.core.polynomials import monomial_term, shared_by, without
@@ -104,7 +104,7 @@ class Goal(Struct, frozen=True):
     counted: Term | None = None
     before: Goal | None = None
 
-    def repeats(self, item: Step) -> bool:
+    def repeats(self, item: IsolationStep) -> bool:
         """Whether a step leads back to an equation on the way to this one, and so would go on for ever."""
         at: Goal | None = self
         while at is not None and (item.inner is not at.inner or item.value is not at.value):
@@ -247,7 +247,7 @@ class _Search:
             goals.append(following)
         return goals
 
-    def follow(self, goal: Goal, item: Step) -> Goal | Stuck:
+    def follow(self, goal: Goal, item: IsolationStep) -> Goal | Stuck:
         following = replace(goal, inner=item.inner, value=item.value, guards=goal.guards + item.guards, before=goal)
         if item.period is None:
             return following

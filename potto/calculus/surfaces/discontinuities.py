@@ -20,7 +20,7 @@ from potto.calculus.decomposition.critical import Critical
 from potto.calculus.inlining.currying import arguments_of, groups_of, sizes_of, uncurry
 from potto.calculus.inlining.expand import expanded
 from potto.calculus.surfaces.nested_brackets import BINDERS, pieces
-from potto.calculus.surfaces.trace import CallSite, Part, Side, layout, spine
+from potto.calculus.surfaces.trace import CallSite, Side, Subkernel, layout, spine
 from potto.core.terms import (
     App,
     Const,
@@ -146,7 +146,7 @@ class _Search(Struct, frozen=True):
             match site:
                 case Side(branch=branch):
                     yield Finding("jump", substitute(branch.surface, mapping), here, branch.strict)
-                case Part():
+                case Subkernel():
                     yield from self.part(site, mapping, here, depth)
                 case CallSite():
                     yield from self.call(site, mapping, here, depth)
@@ -180,7 +180,7 @@ class _Search(Struct, frozen=True):
         assert isinstance(inner, Integral)
         yield from outer_findings(inner, self.resolve, self.decide)
 
-    def part(self, site: Part, mapping: dict[str, Term], path: tuple[int, ...], depth: int) -> Iterator[Finding]:
+    def part(self, site: Subkernel, mapping: dict[str, Term], path: tuple[int, ...], depth: int) -> Iterator[Finding]:
         owner = site.owner
         if isinstance(owner, If):
             outcome = self.decide(substitute(owner.condition, mapping))

@@ -17,7 +17,16 @@ from contextlib import suppress
 from msgspec import Struct
 
 from potto.calculus.algebra.point_values import sample_value
-from potto.calculus.algebra.polytopes import Coefficient, Extent, Form, Forms, Number, Region, region_of, scaled
+from potto.calculus.algebra.polytopes import (
+    AffineForm,
+    Coefficient,
+    Forms,
+    Number,
+    Polytope,
+    VariableBounds,
+    region_of,
+    scaled,
+)
 from potto.calculus.algebra.ranges import ranges
 from potto.calculus.surfaces.nested_brackets import BINDERS, coordinates_of, nested
 from potto.core.simplify import normalized_surface
@@ -68,12 +77,12 @@ def lifted(term: Integral, number: Number) -> Lifted | None:
     for known, few in ((closed_value, True), (number, False)):
         premises: dict[Term, None] = {}
         with suppress(TooManyCases):
-            return Lifted(_of_integral(term, Region({}), frozenset(), known, few, premises), tuple(premises))
+            return Lifted(_of_integral(term, Polytope({}), frozenset(), known, few, premises), tuple(premises))
     return None
 
 
 def _of_integral(
-    term: Integral, outer: Region, names: frozenset[str], number: Number, few: bool, premises: dict[Term, None]
+    term: Integral, outer: Polytope, names: frozenset[str], number: Number, few: bool, premises: dict[Term, None]
 ) -> Integral:
     names = names.union(term.variables)
     forms = Forms(names, number)
@@ -93,7 +102,7 @@ def _of_integral(
     return with_integrand(term, body)
 
 
-class Leaf(Struct, frozen=True, eq=False):
+class BranchLeaf(Struct, frozen=True, eq=False):
     term: Term
 
 
@@ -109,21 +118,21 @@ class Split(Struct, frozen=True, eq=False):
     orelse: Tree
 
 
-Tree = Leaf | Split
-Build = Callable[[tuple[Term, ...], Region], "Tree"]
+Tree = BranchLeaf | Split
+Build = Callable[[tuple[Term, ...], Polytope], "Tree"]
 
 
 class _Trees:
     """The terms of one integrand as trees of the decisions that matter inside of conditions."""
 
-    def __init__(self, body: Term, forms: Forms, region: Region, most: int) -> None:
+    def __init__(self, body: Term, forms: Forms, region: Polytope, most: int) -> None:
         self.forms = forms
         self.region = region
         self.most = most
         self.premises: dict[Term, None] = {}
         self.cases = 0  # of the tree that is being made
         self.splits: dict[tuple[object, ...], Split] = {}
-        self.leaves: dict[Term, Leaf] = {}
+        self.leaves: dict[Term, BranchLeaf] = {}
         self.memo: dict[Term, Tree] = {}
         self.written: dict[Tree, Term] = {}
         surfaces = [c for node in outside(body, (Integral,)) for c in coordinates_of(node)]
@@ -166,16 +175,16 @@ class _Trees:
         if isinstance(node, Branch) and self.is_decision(node):
             then, orelse = self.memo[node.then], self.memo[node.orelse]
 
-            def decided(coordinates: tuple[Term, ...], region: Region) -> Tree:
+            def decided(coordinates: tuple[Term, ...], region: Polytope) -> Tree:
                 return self.split(coordinates, node.strict, then, orelse, region)
 
             return self.walk([self.memo[c] for c in node.coordinates], self.region, decided)
 
         parts = [self.memo[c] for c in children(node)]
-        if all(isinstance(tree, Leaf) and tree.term is c for tree, c in zip(parts, children(node), strict=True)):
+        if all(isinstance(tree, BranchLeaf) and tree.term is c for tree, c in zip(parts, children(node), strict=True)):
             return self.leaf(node)
 
-        def built(parts: tuple[Term, ...], region: Region) -> Tree:
+        def built(parts: tuple[Term, ...], region: Polytope) -> Tree:
             return self.leaf(self.short(proj(parts[0], node.index) if isinstance(node, Proj) else rebuild(node, parts)))
 
         return self.walk(parts, self.region, built)
@@ -185,11 +194,11 @@ class _Trees:
         sides = self.memo[node.then], self.memo[node.orelse]
         return node in self.inner or self.nests(node) or any(isinstance(side, Split) for side in sides)
 
-    def walk(self, trees: Sequence[Tree], region: Region, build: Build) -> Tree:
+    def walk(self, trees: Sequence[Tree], region: Polytope, build: Build) -> Tree:
         """What `build` makes of the leaves that several trees have in common, in each part of a region."""
         first = next((tree for tree in trees if isinstance(tree, Split)), None)
         if first is None:
-            return build(tuple(tree.term for tree in trees if isinstance(tree, Leaf)), region)
+            return build(tuple(tree.term for tree in trees if isinstance(tree, BranchLeaf)), region)
         sides: list[Tree | None] = []
         for up in (True, False):
             inside = self.part(region, first.key, up)
@@ -200,12 +209,12 @@ class _Trees:
         then, orelse = sides if first.up else reversed(sides)
         return self.joined(first.coordinates, first.strict, first.key, first.up, then, orelse)
 
-    def part(self, region: Region, key: tuple[Term, bool], up: bool) -> Region | None:
+    def part(self, region: Polytope, key: tuple[Term, bool], up: bool) -> Polytope | None:
         inside, premises = region.side(key, self.forms.of(key[0]), up)
         self.premises |= dict.fromkeys(premises)
         return inside
 
-    def split(self, coordinates: tuple[Term, ...], strict: bool, then: Tree, orelse: Tree, region: Region) -> Tree:
+    def split(self, coordinates: tuple[Term, ...], strict: bool, then: Tree, orelse: Tree, region: Polytope) -> Tree:
         """The decision by coordinates without brackets, in a region; one of its sides where there is no other."""
         surface = coordinates[0]
         settled = self.settled(surface, strict)
@@ -229,7 +238,7 @@ class _Trees:
             found, side = self.monic(form)
         return ((found, strict), True) if side > 0 else ((found, not strict), False)
 
-    def monic(self, form: Form) -> tuple[Term, int]:
+    def monic(self, form: AffineForm) -> tuple[Term, int]:
         """A form with the first slope 1, if all is numbers; else with a positive one, if that is a number."""
         first = form.slopes[min(form.slopes)]
         if not isinstance(first.term, Const):
@@ -239,7 +248,7 @@ class _Trees:
         same = scaled(form, Coefficient(const(size), size))
         return self.forms.short(same), 1 if first.value > 0 else -1
 
-    def as_leaf(self, parts: tuple[Term, ...], region: Region) -> Tree:
+    def as_leaf(self, parts: tuple[Term, ...], region: Polytope) -> Tree:
         return self.leaf(parts[0])
 
     def settled(self, surface: Term, strict: bool) -> bool | None:
@@ -270,9 +279,9 @@ class _Trees:
             self.splits[known] = Split(coordinates, strict, key, up, then, orelse)
         return self.splits[known]
 
-    def leaf(self, term: Term) -> Leaf:
+    def leaf(self, term: Term) -> BranchLeaf:
         if term not in self.leaves:
-            self.leaves[term] = Leaf(term)
+            self.leaves[term] = BranchLeaf(term)
         return self.leaves[term]
 
     def short(self, term: Term) -> Term:
@@ -290,7 +299,7 @@ class _Trees:
             top = stack[-1]
             if top in self.written:
                 stack.pop()
-            elif isinstance(top, Leaf):
+            elif isinstance(top, BranchLeaf):
                 self.written[top] = top.term
             else:
                 missing = [side for side in (top.then, top.orelse) if side not in self.written]
@@ -309,6 +318,6 @@ def _restricted(tree: Tree, key: tuple[Term, bool], up: bool) -> Tree:
     return tree
 
 
-def _numbers(extent: Extent) -> tuple[float, float]:
+def _numbers(extent: VariableBounds) -> tuple[float, float]:
     known = isinstance(extent.lo.term, Const) and isinstance(extent.hi.term, Const)
     return (extent.lo.value, extent.hi.value) if known else (-float("inf"), float("inf"))

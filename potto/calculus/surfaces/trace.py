@@ -40,7 +40,7 @@ class Side(Struct, frozen=True):
     branch: Branch
 
 
-class Part(Struct, frozen=True):
+class Subkernel(Struct, frozen=True):
     """A site that is a kernel of its own: the then (or else) side of a lazy conditional, or a sum's body.
 
     `owner` is the If, Branch or Sum; `body` the part as a function of its free variables, in sorted order.
@@ -59,10 +59,10 @@ class CallSite(Struct, frozen=True):
     groups: tuple[tuple[Term, ...], ...]
 
 
-Site = Side | Part | CallSite
+Site = Side | Subkernel | CallSite
 
 
-class Layout(Struct, frozen=True):
+class TermSites(Struct, frozen=True):
     """The sites of one term, and the terms evaluated at once (not inside a part, a function or an integral)."""
 
     sites: tuple[Site, ...]
@@ -142,7 +142,7 @@ def _integrates(term: Term) -> bool:
 
 
 @lru_cache(maxsize=16384)
-def layout(term: Term) -> Layout:
+def layout(term: Term) -> TermSites:
     order = postorder_by(term, immediate)
     sites: list[Site] = []
     index: dict[tuple[Term, int], int] = {}
@@ -155,12 +155,12 @@ def layout(term: Term) -> Layout:
         if isinstance(node, (If, Branch)) and is_lazy(node):
             if isinstance(node, Branch):
                 site(node, 2, Side(node))
-            site(node, 0, Part(node, 0, function_of(node.then)))
-            site(node, 1, Part(node, 1, function_of(node.orelse)))
+            site(node, 0, Subkernel(node, 0, function_of(node.then)))
+            site(node, 1, Subkernel(node, 1, function_of(node.orelse)))
         elif isinstance(node, Branch):
             site(node, 2, Side(node))
         elif isinstance(node, Sum):
-            site(node, 0, Part(node, 0, lam(tuple(sorted(node.body.free | {node.variable})), node.body)))
+            site(node, 0, Subkernel(node, 0, lam(tuple(sorted(node.body.free | {node.variable})), node.body)))
         elif isinstance(node, App):
             site(node, 0, CallSite(node, *spine(node)))
-    return Layout(tuple(sites), index, tuple(order))
+    return TermSites(tuple(sites), index, tuple(order))

@@ -12,7 +12,7 @@ from msgspec.structs import replace
 
 from potto.ide.actions.extract import extractions
 from potto.ide.actions.inline import inlinings
-from potto.ide.actions.offers import At, Offer, at
+from potto.ide.actions.offers import At, PendingAction, at
 from potto.ide.actions.organize_imports import organizations
 from potto.ide.actions.quick_fixes import fixes
 from potto.ide.actions.rewrites import rewrites
@@ -20,7 +20,7 @@ from potto.ide.model import CodeAction
 from potto.query import Database
 from potto.source import Span
 
-SOURCES: tuple[Callable[[At], Iterable[Offer]], ...] = (fixes, rewrites, extractions, inlinings, organizations)
+SOURCES: tuple[Callable[[At], Iterable[PendingAction]], ...] = (fixes, rewrites, extractions, inlinings, organizations)
 
 
 def code_actions(db: Database, file: str, span: Span, kinds: Sequence[str] = ()) -> tuple[CodeAction, ...]:
@@ -52,6 +52,6 @@ def resolve_code_action(db: Database, action: CodeAction) -> CodeAction:
             return action
 
 
-def _offers(place: At) -> Iterable[Offer]:
+def _offers(place: At) -> Iterable[PendingAction]:
     for source in SOURCES:
         yield from source(place)

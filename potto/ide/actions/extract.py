@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from potto.ide.actions.edits import applied, one_file
-from potto.ide.actions.offers import At, Offer, fresh_name, reads
+from potto.ide.actions.offers import At, PendingAction, fresh_name, reads
 from potto.ide.model import Change, Edit
 from potto.ide.names.index import BoundName
 from potto.ide.names.places import ChunkAt, line_start
@@ -26,7 +26,7 @@ _EXPRESSIONS = (
 _SCOPES = (nodes.Lambda, nodes.Integral, nodes.Reduction, nodes.Fold, nodes.Comprehension, nodes.Let)
 
 
-def extractions(place: At) -> Iterator[Offer]:
+def extractions(place: At) -> Iterator[PendingAction]:
     """The ways to give the selected expression a name."""
     chunk = place.chunk
     if chunk is None or not len(place.span):
@@ -41,9 +41,11 @@ def extractions(place: At) -> Iterator[Offer]:
         return
     path = path[: place_in + 1]
     work = Extraction(place, chunk, item, path)
-    yield Offer("Extract to a local name", "refactor.extract", work.local, rename_at=work.local_name_at)
+    yield PendingAction("Extract to a local name", "refactor.extract", work.local, rename_at=work.local_name_at)
     if not isinstance(path[-1], nodes.InlineDiffeo) and not _decides(path):
-        yield Offer("Extract to a definition", "refactor.extract", work.definition, rename_at=work.definition_name_at)
+        yield PendingAction(
+            "Extract to a definition", "refactor.extract", work.definition, rename_at=work.definition_name_at
+        )
 
 
 def _decides(path: Sequence[Node]) -> bool:

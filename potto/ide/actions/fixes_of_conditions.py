@@ -7,14 +7,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from potto.calculus.checking.solvability import Problem, Role, judge
+from potto.calculus.checking.solvability import ConditionProblem, Role, judge
 from potto.core.printer import format_term
 from potto.core.simplify import simplify
 from potto.core.terms import Branch, Hole, Term, postorder
 from potto.diagnostics import Diagnostic
 from potto.elaborate import elaborate_expression
 from potto.ide.actions.edits import one_file
-from potto.ide.actions.offers import At, Offer, reads
+from potto.ide.actions.offers import At, PendingAction, reads
 from potto.ide.hover.derivatives import diffeo_of, inverse_text
 from potto.ide.model import Change, Edit
 from potto.ide.names.places import ChunkAt, chunk_at
@@ -25,7 +25,7 @@ from potto.syntax.nodes import Expr
 from potto.syntax.written import without_parentheses
 
 
-def bracket_fixes(place: At, said: Diagnostic) -> Iterator[Offer]:
+def bracket_fixes(place: At, said: Diagnostic) -> Iterator[PendingAction]:
     """A bracket around the condition, or the diffeomorphism that the checker makes of it.
 
     The condition may be in another definition, to which a variable of integration is given here.
@@ -54,23 +54,23 @@ def condition_at(place: At, chunk: ChunkAt, span: Span) -> Expr | None:
     return None
 
 
-def _bracket(place: At, chunk: ChunkAt, condition: Expr, said: Diagnostic) -> Iterator[Offer]:
+def _bracket(place: At, chunk: ChunkAt, condition: Expr, said: Diagnostic) -> Iterator[PendingAction]:
     written = chunk.text[condition.span.start : condition.span.end]
     item = chunk.parsed(place.db).item
     where = "" if place.chunk is not None and chunk.start == place.chunk.start else f" in `{getattr(item, 'name', '')}`"
     equal = any(isinstance(n, nodes.Compare) and any(o.op in ("==", "!=") for o in n.rest) for n in walk(condition))
     verdict = None if equal else judged(place.db, chunk, condition)
-    if equal or isinstance(verdict, Problem):
+    if equal or isinstance(verdict, ConditionProblem):
         return  # a bracket would only be the next mistake
     if reads(chunk, [Edit(condition.span, f"[{written}]")]) is not None:
         edit = Edit(chunk.absolute(condition.span), f"[{written}]")
         title = f"Count the jump{where}: `[{written}]`"
-        yield Offer(title, "quickfix", lambda: one_file(chunk.file, edit), said, True)
+        yield PendingAction(title, "quickfix", lambda: one_file(chunk.file, edit), said, True)
     completed = completed_diffeo(place, chunk, condition)
     if completed is not None:
         other = Edit(chunk.absolute(condition.span), completed)
         title = f"Make it the diffeomorphism `{completed}`"
-        yield Offer(title, "quickfix", lambda: one_file(chunk.file, other), said)
+        yield PendingAction(title, "quickfix", lambda: one_file(chunk.file, other), said)
 
 
 def completed_diffeo(place: At, chunk: ChunkAt, condition: Expr) -> str | None:
@@ -82,7 +82,9 @@ def completed_diffeo(place: At, chunk: ChunkAt, condition: Expr) -> str | None:
     return f"diffeo({', '.join(shown)})"
 
 
-def judged(db: Database, chunk: ChunkAt, condition: Expr, role: Role = "bracket") -> tuple[Term, ...] | Problem | None:
+def judged(
+    db: Database, chunk: ChunkAt, condition: Expr, role: Role = "bracket"
+) -> tuple[Term, ...] | ConditionProblem | None:
     """The coordinates of a comparison over variables of integration, completed, or why there are none; None for what is
     no comparison over them."""
     term = compared(db, chunk, condition)
@@ -94,7 +96,7 @@ def judged(db: Database, chunk: ChunkAt, condition: Expr, role: Role = "bracket"
     if not used:
         return None
     verdict = judge(term.coordinates, variables, {}, role=role)
-    return verdict if isinstance(verdict, Problem) else (*term.coordinates, *verdict.completion)
+    return verdict if isinstance(verdict, ConditionProblem) else (*term.coordinates, *verdict.completion)
 
 
 def compared(db: Database, chunk: ChunkAt, condition: Expr) -> Branch | None:
@@ -107,7 +109,7 @@ def compared(db: Database, chunk: ChunkAt, condition: Expr) -> Branch | None:
     return term if isinstance(term, Branch) and not any(isinstance(n, Hole) for n in postorder(term)) else None
 
 
-def inverse_fixes(place: At, said: Diagnostic) -> Iterator[Offer]:
+def inverse_fixes(place: At, said: Diagnostic) -> Iterator[PendingAction]:
     """An `inverse` to fill in, for a diffeomorphism whose inverse was not found."""
     chunk = chunk_at(place.db, place.file, said.span.start)
     item = None if chunk is None else chunk.parsed(place.db).item
@@ -121,7 +123,7 @@ def inverse_fixes(place: At, said: Diagnostic) -> Iterator[Offer]:
         return
     text = inverse_text(names[:count], [v.name for v in item.variables])
     edit = inverse_edit(chunk, item, text)
-    yield Offer("Add an `inverse` to fill in", "quickfix", lambda: one_file(place.file, edit), said)
+    yield PendingAction("Add an `inverse` to fill in", "quickfix", lambda: one_file(place.file, edit), said)
 
 
 def inverse_edit(chunk: ChunkAt, item: nodes.DiffeoDefinition, text: str) -> Edit:

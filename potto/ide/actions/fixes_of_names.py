@@ -9,7 +9,7 @@ from itertools import islice
 from potto.diagnostics import Diagnostic
 from potto.ide.actions.edits import one_file
 from potto.ide.actions.imports import import_edit, new_line
-from potto.ide.actions.offers import At, Offer
+from potto.ide.actions.offers import At, PendingAction
 from potto.ide.model import Change, Edit
 from potto.ide.names.places import ChunkAt, chunk_at
 from potto.modules import find_module
@@ -22,7 +22,7 @@ _NAME = re.compile(r"[^\W\d]\w*")
 MOST_MODULES = 5  # that are offered to import a name from
 
 
-def undefined_fixes(place: At, said: Diagnostic) -> Iterator[Offer]:
+def undefined_fixes(place: At, said: Diagnostic) -> Iterator[PendingAction]:
     """Where the name could come from."""
     name = place.text[said.span.start : said.span.end]
     chunk = chunk_at(place.db, place.file, said.span.start)
@@ -30,7 +30,7 @@ def undefined_fixes(place: At, said: Diagnostic) -> Iterator[Offer]:
         return
     if find_module(place.db, place.file, name) is not None and place.text[said.span.end : said.span.end + 1] == ".":
         edit = new_line(place.db, place.file, f"import {name}")
-        yield Offer(f"Import the module `{name}`", "quickfix", lambda: one_file(place.file, edit), said, True)
+        yield PendingAction(f"Import the module `{name}`", "quickfix", lambda: one_file(place.file, edit), said, True)
         return
     if not _NAME.fullmatch(name) or place.text[said.span.start - 1 : said.span.start] == ".":
         return
@@ -39,15 +39,15 @@ def undefined_fixes(place: At, said: Diagnostic) -> Iterator[Offer]:
         module = module_name(place.db, place.file, target)
         if module is not None:
             title = f"Import `{name}` from `{module}`"
-            yield Offer(title, "quickfix", lambda t=target: _import(place, t, name), said, len(found) == 1)  # type: ignore[misc]
-    yield Offer(f"Define `{name}`", "quickfix", lambda: _define(place, chunk, said.span, name), said)
+            yield PendingAction(title, "quickfix", lambda t=target: _import(place, t, name), said, len(found) == 1)  # type: ignore[misc]
+    yield PendingAction(f"Define `{name}`", "quickfix", lambda: _define(place, chunk, said.span, name), said)
     item = chunk.parsed(place.db).item
     if isinstance(item, nodes.Definition) and item.keyword and item.groups:
         group = item.groups[0]
         title = f"Make `{name}` a parameter of `{item.name}`"
         end = chunk.start + (group[-1].span.end if group else item.name_span.end + 1)
         edit = Edit(Span(end, end), f", {name}" if group else name)
-        yield Offer(title, "quickfix", lambda: one_file(place.file, edit), said)
+        yield PendingAction(title, "quickfix", lambda: one_file(place.file, edit), said)
 
 
 def _import(place: At, target: str, name: str) -> Change | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from potto.ide.actions.edits import one_file
-from potto.ide.actions.offers import At, Offer, as_operand, reads
+from potto.ide.actions.offers import At, PendingAction, as_operand, reads
 from potto.ide.actions.quick_fixes import without_binding
 from potto.ide.model import Change, Edit
 from potto.ide.names.index import NameIndex
@@ -17,7 +17,7 @@ from potto.syntax import nodes, walk
 Block = nodes.Definition | nodes.DiffeoDefinition | nodes.Let
 
 
-def inlinings(place: At) -> Iterator[Offer]:
+def inlinings(place: At) -> Iterator[PendingAction]:
     """The local name at the selection, if it can be inlined."""
     found = symbol_at(place.db, place.file, place.span.start)
     if found is None or not isinstance(found.symbol, LocalSymbol) or found.symbol.binder.kind != "local":
@@ -29,7 +29,7 @@ def inlinings(place: At) -> Iterator[Offer]:
             for binding in node.bindings:
                 if len(binding.targets) == 1 and binding.targets[0].span == symbol.binder.span:
                     title = f"Inline `{symbol.binder.name}`"
-                    yield Offer(
+                    yield PendingAction(
                         title, "refactor.inline",
                         lambda n=node, b=binding: _inlined(place, symbol, n, b),  # type: ignore[misc]
                     )  # fmt: skip

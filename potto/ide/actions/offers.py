@@ -1,6 +1,6 @@
 """What code actions are made of: an offer is a title and a way to the change, which is made only when it is wanted.
 
-Owns `Offer`, `At` (where actions are asked for) and helpers that all of them need.
+Owns `PendingAction`, `At` (where actions are asked for) and helpers that all of them need.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from potto.syntax.nodes import Node
 from potto.types import check_statement
 
 
-class Offer(Struct, frozen=True):
+class PendingAction(Struct, frozen=True):
     """A code action that isn't carried out yet. `rename_at`: where the new name is in the text after the change."""
 
     title: str

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from potto.ide.actions.edits import minimal, one_file
 from potto.ide.actions.imports import import_chunks
-from potto.ide.actions.offers import At, Offer
+from potto.ide.actions.offers import At, PendingAction
 from potto.ide.model import Change
 from potto.ide.names.places import ChunkAt, all_chunks
 from potto.modules import names
@@ -15,18 +15,18 @@ from potto.query import Database
 from potto.syntax import format_source, nodes
 
 
-def organizations(place: At) -> Iterator[Offer]:
+def organizations(place: At) -> Iterator[PendingAction]:
     """What can be done about the imports of the file."""
     if not import_chunks(place.db, place.file):
         return
     sorted_only = organized(place.db, place.file, place.text, drop=False)
     if sorted_only is not None:
-        yield Offer(
+        yield PendingAction(
             "Sort the imports", "source.organizeImports", lambda: organized(place.db, place.file, place.text, False)
         )
     unused = unused_imports(place.db, place.file) - set(names(place.db, place.file))
     if unused:
-        yield Offer(
+        yield PendingAction(
             "Remove all unused imports", "source.fixAll", lambda: organized(place.db, place.file, place.text, True)
         )
 

@@ -12,7 +12,7 @@ from potto.diagnostics import Diagnostic
 from potto.ide.actions.edits import applied, one_file
 from potto.ide.actions.fixes_of_conditions import bracket_fixes, inverse_fixes
 from potto.ide.actions.fixes_of_names import undefined_fixes
-from potto.ide.actions.offers import At, Offer, diagnostics_at
+from potto.ide.actions.offers import At, PendingAction, diagnostics_at
 from potto.ide.model import Change, Edit
 from potto.ide.names.places import ChunkAt, chunk_at, line_end, line_start
 from potto.modules.kinds import IMPORTED_TWICE, UNUSED_IMPORT
@@ -21,7 +21,7 @@ from potto.syntax import nodes, parse_chunk, walk
 from potto.types.kinds import NOT_DEFINED, UNUSED_LOCAL, UNUSED_VARIABLE, VARYING_CONDITION
 
 
-def fixes(place: At) -> Iterator[Offer]:
+def fixes(place: At) -> Iterator[PendingAction]:
     """What can be done about the diagnostics that the selection touches."""
     for said in diagnostics_at(place.db, place.file, place.span):
         yield from _suggested(place, said)
@@ -37,7 +37,7 @@ def fixes(place: At) -> Iterator[Offer]:
             yield from _unused_local(place, said)
 
 
-def _suggested(place: At, said: Diagnostic) -> Iterator[Offer]:
+def _suggested(place: At, said: Diagnostic) -> Iterator[PendingAction]:
     """The changes that a diagnostic carries. What can't be read was guessed at, so that a change is kept if more can be
     read after it; any other must leave as much."""
     chunk = chunk_at(place.db, place.file, said.span.start)
@@ -50,7 +50,7 @@ def _suggested(place: At, said: Diagnostic) -> Iterator[Offer]:
         of_reading = before > 0 and said.code.startswith("P01")
         if after < before or (after == before and not of_reading):
             change = one_file(place.file, *edits)
-            yield Offer(suggestion.title, "quickfix", lambda c=change: c, said, preferred)  # type: ignore[misc]
+            yield PendingAction(suggestion.title, "quickfix", lambda c=change: c, said, preferred)  # type: ignore[misc]
             preferred = False
 
 
@@ -63,7 +63,7 @@ def _errors(chunk: ChunkAt, edits: Iterable[Edit]) -> int:
 # What is not used
 
 
-def _unused_import(place: At, said: Diagnostic) -> Iterator[Offer]:
+def _unused_import(place: At, said: Diagnostic) -> Iterator[PendingAction]:
     chunk = chunk_at(place.db, place.file, said.span.start)
     item = None if chunk is None else chunk.parsed(place.db).item
     if chunk is None or not isinstance(item, nodes.FromImport | nodes.Import):
@@ -74,10 +74,14 @@ def _unused_import(place: At, said: Diagnostic) -> Iterator[Offer]:
     if gone is None or len(names) == 1:
         what = names[0].name if len(names) == 1 else item.module
         whole = without_chunk(place.text, chunk)
-        yield Offer(f"Remove the import of `{what}`", "quickfix", lambda: one_file(place.file, whole), said, True)
+        yield PendingAction(
+            f"Remove the import of `{what}`", "quickfix", lambda: one_file(place.file, whole), said, True
+        )
         return
     edit = Edit(chunk.absolute(list_item(names.index(gone), tuple(n.span for n in names))), "")
-    yield Offer(f"Remove the import of `{gone.name}`", "quickfix", lambda: one_file(place.file, edit), said, True)
+    yield PendingAction(
+        f"Remove the import of `{gone.name}`", "quickfix", lambda: one_file(place.file, edit), said, True
+    )
 
 
 def without_chunk(text: str, chunk: ChunkAt) -> Edit:
@@ -94,7 +98,7 @@ def list_item(number: int, spans: tuple[Span, ...]) -> Span:
     return Span(spans[number - 1].end if number else spans[number].start, spans[number].end)
 
 
-def _unused_local(place: At, said: Diagnostic) -> Iterator[Offer]:
+def _unused_local(place: At, said: Diagnostic) -> Iterator[PendingAction]:
     chunk = chunk_at(place.db, place.file, said.span.start)
     item = None if chunk is None else chunk.parsed(place.db).item
     if chunk is None or item is None:
@@ -107,8 +111,8 @@ def _unused_local(place: At, said: Diagnostic) -> Iterator[Offer]:
                 if len(binding.targets) == 1 and binding.targets[0].span == relative:
                     edit = without_binding(place.text, chunk, node, binding)
                     change = one_file(place.file, edit)
-                    yield Offer(f"Remove `{name}`", "quickfix", lambda c=change: c, said, True)  # type: ignore[misc]
-    yield Offer(f"Rename it to `_{name}`", "quickfix", lambda: _underscored(place, chunk, relative, name), said)
+                    yield PendingAction(f"Remove `{name}`", "quickfix", lambda c=change: c, said, True)  # type: ignore[misc]
+    yield PendingAction(f"Rename it to `_{name}`", "quickfix", lambda: _underscored(place, chunk, relative, name), said)
 
 
 def _underscored(place: At, chunk: ChunkAt, relative: Span, name: str) -> Change | None:

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 
 from potto.ide.actions.edits import one_file
 from potto.ide.actions.fixes_of_conditions import written_inverse
-from potto.ide.actions.offers import At, Offer, bare, reads
+from potto.ide.actions.offers import At, PendingAction, bare, reads
 from potto.ide.completion.pending_calls import PendingCall, call_at
 from potto.ide.completion.signature_help import called_at
 from potto.ide.model import Change, Edit
@@ -22,20 +22,20 @@ from potto.types import Function, Parameter, TupleOf, Type, groups_of
 _NAME_BEFORE = re.compile(r"\w+ *\(")
 
 
-def rewrites(place: At) -> Iterator[Offer]:
+def rewrites(place: At) -> Iterator[PendingAction]:
     """The rewrites of what the selection begins in."""
     yield from _conditional(place)
     yield from _inverse(place)
     yield from _arguments(place)
 
 
-def _conditional(place: At) -> Iterator[Offer]:
+def _conditional(place: At) -> Iterator[PendingAction]:
     node = next((n for n in reversed(place.path) if isinstance(n, nodes.If)), None)
     if node is None or place.chunk is None:
         return
     chunk, found = place.chunk, node
     title = "Write it with `? :`" if node.style == "if" else "Write it with `if`"
-    yield Offer(title, "refactor.rewrite", lambda: _swapped(place, chunk, found))
+    yield PendingAction(title, "refactor.rewrite", lambda: _swapped(place, chunk, found))
 
 
 def _swapped(place: At, chunk: ChunkAt, node: nodes.If) -> Change | None:
@@ -50,12 +50,12 @@ def _swapped(place: At, chunk: ChunkAt, node: nodes.If) -> Change | None:
     return None
 
 
-def _inverse(place: At) -> Iterator[Offer]:
+def _inverse(place: At) -> Iterator[PendingAction]:
     if written_inverse(place) is not None:
-        yield Offer("Write down the inverse", "refactor.rewrite", lambda: written_inverse(place))
+        yield PendingAction("Write down the inverse", "refactor.rewrite", lambda: written_inverse(place))
 
 
-def _arguments(place: At) -> Iterator[Offer]:
+def _arguments(place: At) -> Iterator[PendingAction]:
     call = call_at(place.db, place.file, _into_call(place.text, place.span.start))
     if call is None or call.measure:
         return
@@ -66,7 +66,7 @@ def _arguments(place: At) -> Iterator[Offer]:
     left = _left(groups[called.given], call) if called.given < len(groups) else ()
     if left:
         title = f"Complete the arguments of `{called.name}`"
-        yield Offer(title, "refactor.rewrite", lambda: _completed(place, call, left))
+        yield PendingAction(title, "refactor.rewrite", lambda: _completed(place, call, left))
 
 
 def _into_call(text: str, at: int) -> int:

@@ -17,7 +17,7 @@ from potto.ide.actions.imports import import_edit, importable, new_line
 from potto.ide.completion.fields import changed_items, part_items
 from potto.ide.completion.modules import member_items, module_items, name_items
 from potto.ide.completion.pending_calls import call_in
-from potto.ide.completion.place import Place, place_in
+from potto.ide.completion.place import CompletionPlace, place_in
 from potto.ide.completion.signature_help import called_in
 from potto.ide.hover.derivatives import fence
 from potto.ide.hover.hovers import builtin_markdown, measure_markdown, measure_signature, module_markdown
@@ -92,7 +92,7 @@ def _at(db: Database, site: Site, trigger: str) -> Completions:
         return _everything(db, site, place)
 
 
-def _everything(db: Database, site: Site, place: Place) -> Completions:
+def _everything(db: Database, site: Site, place: CompletionPlace) -> Completions:
     items: dict[str, Completion] = {}
     for item in (*_arguments(db, site, place), *_locals(db, site, place)):
         items.setdefault(item.label, item)
@@ -102,14 +102,14 @@ def _everything(db: Database, site: Site, place: Place) -> Completions:
     return Completions(place.span, (*items.values(), *others), not place.word or len(others) >= MOST_IMPORTS)
 
 
-def _letters(place: Place) -> Iterator[Completion]:
+def _letters(place: CompletionPlace) -> Iterator[Completion]:
     for name, letter in LETTERS.items():
         if name.startswith(place.word) or name.casefold().startswith(place.word.casefold()):
             written = f"\\{name}"
             yield Completion(letter, "symbol", place.span, letter, name, written, detail=written)
 
 
-def _measures(place: Place) -> Iterator[Completion]:
+def _measures(place: CompletionPlace) -> Iterator[Completion]:
     every: tuple[Measure | Composition, ...] = (*MEASURES.values(), *COMPOSITIONS.values())
     for measure in every:
         name = measure.name
@@ -120,20 +120,20 @@ def _measures(place: Place) -> Iterator[Completion]:
         )  # fmt: skip
 
 
-def _types(place: Place) -> Iterator[Completion]:
+def _types(place: CompletionPlace) -> Iterator[Completion]:
     for name in ("Real", "Real*", "Diffeo[2]"):
         doc = TYPES[name.rstrip("*").partition("[")[0]]
         yield Completion(name, "type", place.span, name, name, documentation=doc)
 
 
-def _records(db: Database, file: str, place: Place) -> Iterator[Completion]:
+def _records(db: Database, file: str, place: CompletionPlace) -> Iterator[Completion]:
     """The records of a file and of its imports, as types."""
     for item in _file_names(db, site_after(file, ""), place):
         if item.kind == "record":
             yield item
 
 
-def _data_files(file: str, place: Place) -> Iterator[Completion]:
+def _data_files(file: str, place: CompletionPlace) -> Iterator[Completion]:
     """The files of data in the folder that is written so far."""
     folder = place.word[: place.word.rfind("/") + 1]
     span = Span(place.span.start + len(folder), place.span.end)
@@ -141,7 +141,7 @@ def _data_files(file: str, place: Place) -> Iterator[Completion]:
         yield Completion(name, "file", span, name, name)
 
 
-def _arguments(db: Database, site: Site, place: Place) -> Iterator[Completion]:
+def _arguments(db: Database, site: Site, place: CompletionPlace) -> Iterator[Completion]:
     """The parameters that the call at hand can be given by name."""
     call = None if site.chunk is None else call_in(db, site.chunk, site.offset - site.chunk.start)
     if call is None or not call.fresh or call.measure:
@@ -161,7 +161,7 @@ def _arguments(db: Database, site: Site, place: Place) -> Iterator[Completion]:
                 )
 
 
-def _locals(db: Database, site: Site, place: Place) -> Iterator[Completion]:
+def _locals(db: Database, site: Site, place: CompletionPlace) -> Iterator[Completion]:
     if site.writing is None or place.kind == "top":
         return
     file, (chunk, relative) = site.file, site.writing
@@ -174,7 +174,7 @@ def _locals(db: Database, site: Site, place: Place) -> Iterator[Completion]:
         yield Completion(binder.name, kind, place.span, binder.name, sort, description=TITLES[binder.kind], data=data)
 
 
-def _file_names(db: Database, site: Site, place: Place) -> Iterator[Completion]:
+def _file_names(db: Database, site: Site, place: CompletionPlace) -> Iterator[Completion]:
     """The names at the top of the file; at a prompt also those of earlier entries."""
     file = site.file
     own = None if site.writing is None else owner(db, site.writing[0])  # a constant cannot be made of itself
@@ -207,7 +207,7 @@ def definition_item(db: Database, file: str, name: str, span: Span, group: str) 
     return Completion(name, kind, span, name, group + name, data=("definition", file, name))
 
 
-def builtin_items(place: Place) -> Iterator[Completion]:
+def builtin_items(place: CompletionPlace) -> Iterator[Completion]:
     """The builtins as proposals."""
     for name, special in SPECIALS.items():
         kind: CompletionKind = "builtin" if "->" in special.type else "constant"
@@ -218,7 +218,7 @@ def builtin_items(place: Place) -> Iterator[Completion]:
             yield Completion(name, "builtin", place.span, name, _BUILTIN + name, data=("builtin", name))
 
 
-def _keywords(site: Site, place: Place) -> Iterator[Completion]:
+def _keywords(site: Site, place: CompletionPlace) -> Iterator[Completion]:
     chunk = site.chunk
     before = "" if chunk is None else site.text[chunk.start : site.offset - len(place.word)]
     goes_on = bool(_OPERAND.search(before)) and place.kind != "top"
@@ -237,7 +237,7 @@ def _keywords(site: Site, place: Place) -> Iterator[Completion]:
         yield _keyword(keyword, place, group)
 
 
-def _keyword(keyword: Keyword, place: Place, group: str) -> Completion:
+def _keyword(keyword: Keyword, place: CompletionPlace, group: str) -> Completion:
     kind: CompletionKind = "snippet" if "$" in keyword.snippet else "keyword"
     return Completion(
         keyword.name, kind, place.span, keyword.snippet, group + keyword.name, snippet=kind == "snippet",
@@ -256,7 +256,7 @@ def _fits(word: str, before: str, diffeo: bool) -> bool:
     return word != "as" and bool(before.strip())
 
 
-def _others(db: Database, file: str, place: Place, items: dict[str, Completion]) -> list[Completion]:
+def _others(db: Database, file: str, place: CompletionPlace, items: dict[str, Completion]) -> list[Completion]:
     """Definitions of other modules; choosing one imports it. The import is worked out on resolving."""
     found: list[Completion] = []
     for name, target in importable(db, file, place.word, items, MOST_IMPORTS):

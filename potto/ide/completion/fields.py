@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from potto.ide.completion.place import Place, operand_start
+from potto.ide.completion.place import CompletionPlace, operand_start
 from potto.ide.hover.local_names import local_type
 from potto.ide.model import Completion
 from potto.ide.names.places import Site
@@ -25,7 +25,7 @@ _WITH = re.compile(r"\bwith\s+(?=\w*$|\(|\w+\s*=)")
 _GIVEN = re.compile(r"(?:^|[(,])\s*([^\W\d]\w*)\s*=(?!=)")
 
 
-def part_items(db: Database, site: Site, place: Place) -> Iterator[Completion]:
+def part_items(db: Database, site: Site, place: CompletionPlace) -> Iterator[Completion]:
     """What can stand behind `u.`."""
     type = _before(db, site, place.span.start - 1)
     if isinstance(type, TupleOf):
@@ -34,7 +34,7 @@ def part_items(db: Database, site: Site, place: Place) -> Iterator[Completion]:
             yield Completion(name, "field", place.span, name, f"{number:03}", detail=detail)
 
 
-def changed_items(db: Database, site: Site, place: Place) -> Iterator[Completion]:
+def changed_items(db: Database, site: Site, place: CompletionPlace) -> Iterator[Completion]:
     """The fields of a record that can stand after `with`, except for those already given."""
     found = changed_at(site.text, place.span.start)
     if found is None or found[2]:

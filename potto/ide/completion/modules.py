@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from msgspec.structs import replace
 
 from potto.ide.completion.fields import part_items
-from potto.ide.completion.place import Place
+from potto.ide.completion.place import CompletionPlace
 from potto.ide.model import Completion
 from potto.ide.names.documents import written_kind
 from potto.ide.names.places import Site
@@ -39,13 +39,13 @@ def modules_for(db: Database, file: str) -> tuple[tuple[str, str], ...]:
     return tuple(sorted(found.items()))
 
 
-def module_items(db: Database, file: str, place: Place) -> Iterator[Completion]:
+def module_items(db: Database, file: str, place: CompletionPlace) -> Iterator[Completion]:
     """Modules, after `from` or `import`."""
     for dotted, target in modules_for(db, file):
         yield Completion(dotted, "module", place.span, dotted, dotted, data=("module", target, dotted))
 
 
-def name_items(db: Database, site: Site, place: Place) -> Iterator[Completion]:
+def name_items(db: Database, site: Site, place: CompletionPlace) -> Iterator[Completion]:
     """The names of a module, after `from m import`; those that are imported already are left out."""
     file = site.file
     module = find_module(db, file, place.path)
@@ -61,7 +61,7 @@ def name_items(db: Database, site: Site, place: Place) -> Iterator[Completion]:
             yield Completion(name, "module", place.span, name, name, data=("module", target, dotted))
 
 
-def member_items(db: Database, site: Site, place: Place) -> Iterator[Completion]:
+def member_items(db: Database, site: Site, place: CompletionPlace) -> Iterator[Completion]:
     """What follows `m.`: the names of the module, and the modules of a package that is imported."""
     file, chunk = site.file, site.chunk
     head = place.path.partition(".")[0]
@@ -82,7 +82,7 @@ def member_items(db: Database, site: Site, place: Place) -> Iterator[Completion]
             yield Completion(name, "module", place.span, name, name)
 
 
-def _not_imported(db: Database, file: str, place: Place) -> Iterator[Completion]:
+def _not_imported(db: Database, file: str, place: CompletionPlace) -> Iterator[Completion]:
     """The names of a module that is written without being imported: to take one imports it."""
     module = find_module(db, file, place.path)
     for item in () if module is None or module == file else _names_of(db, module, place):
@@ -94,7 +94,7 @@ def _not_imported(db: Database, file: str, place: Place) -> Iterator[Completion]
                 pass
 
 
-def _names_of(db: Database, module: str, place: Place) -> Iterator[Completion]:
+def _names_of(db: Database, module: str, place: CompletionPlace) -> Iterator[Completion]:
     for name in names(db, module):
         kind = written_kind(db, module, name)
         yield Completion(name, kind, place.span, name, "0" + name, data=("definition", module, name))
@@ -109,7 +109,7 @@ def _names_of(db: Database, module: str, place: Place) -> Iterator[Completion]:
                 yield Completion(bound, "module", place.span, bound, "1" + bound)
 
 
-def _taken(db: Database, site: Site, place: Place) -> set[str]:
+def _taken(db: Database, site: Site, place: CompletionPlace) -> set[str]:
     chunk = site.chunk
     item = None if chunk is None else chunk.parsed(db).item
     if chunk is None or not isinstance(item, nodes.FromImport):

@@ -34,7 +34,7 @@ _NUMBER = re.compile(r"(?:^|[^\w.])[0-9][\w.]*$")
 _IMPORT_LINES = re.compile(r"(?:^|\n)(from\s[^\n]*(?:,|import)[ \t]*(?:\r?\n[ \t]+[^\n]*)*)$")
 
 
-class Place(Struct, frozen=True):
+class CompletionPlace(Struct, frozen=True):
     """`span` is the word so far, absolute; `path` the module in front of it, where there is one."""
 
     kind: Kind
@@ -43,7 +43,7 @@ class Place(Struct, frozen=True):
     path: str = ""
 
 
-def place_in(text: str, offset: int) -> Place:
+def place_in(text: str, offset: int) -> CompletionPlace:
     """The kind of word at an offset of a text."""
     start = line_start(text, offset)
     line = text[start:offset]
@@ -52,15 +52,15 @@ def place_in(text: str, offset: int) -> Place:
     span = Span(offset - len(word), offset)
     letter = _LETTER.search(line)
     if letter is not None:
-        return Place("letter", Span(start + letter.start(), offset), letter.group(1))
+        return CompletionPlace("letter", Span(start + letter.start(), offset), letter.group(1))
     hash_at = line.find("#")
     if hash_at >= 0:
         if not line.startswith("#>", hash_at):
-            return Place("nothing", span, word)
+            return CompletionPlace("nothing", span, word)
         line = line[hash_at + 2 :].lstrip() or " "
         return _expression(" " + line, span, word)
     if _NUMBER.search(line) and not _FILE.search(line):
-        return Place("nothing", span, word)
+        return CompletionPlace("nothing", span, word)
     continued = _IMPORT_LINES.search(text[max(0, start - 2000) : offset]) if line[:1] in (" ", "\t") else None
     logical = " ".join(continued.group(1).split("\n")) if continued else line
     return _import(logical, span) or _expression(line, span, word)
@@ -94,46 +94,46 @@ def operand_start(text: str, end: int) -> int | None:
     return at if at < end else None
 
 
-def _import(line: str, span: Span) -> Place | None:
+def _import(line: str, span: Span) -> CompletionPlace | None:
     if not line.startswith(("from", "import")):
         return None
     for pattern in (_FROM, _IMPORT):
         found = pattern.search(line)
         if found is not None:
             path = found.group(1)
-            return Place("module", Span(span.end - len(path), span.end), path)
+            return CompletionPlace("module", Span(span.end - len(path), span.end), path)
     found = _NAMES.search(line)
     if found is not None:
         word = found.group(2)
-        return Place("imported", Span(span.end - len(word), span.end), word, found.group(1))
+        return CompletionPlace("imported", Span(span.end - len(word), span.end), word, found.group(1))
     if _ALIAS.search(line):
-        return Place("new", span, "")
+        return CompletionPlace("new", span, "")
     found = _MODULE_ONLY.search(line)
     if found is not None:
-        return Place("clause", span, found.group(1), "import")
-    return Place("clause", span, "", "as") if re.match(r"(from|import)\s", line) else None
+        return CompletionPlace("clause", span, found.group(1), "import")
+    return CompletionPlace("clause", span, "", "as") if re.match(r"(from|import)\s", line) else None
 
 
-def _expression(line: str, span: Span, word: str) -> Place:
+def _expression(line: str, span: Span, word: str) -> CompletionPlace:
     loaded = _FILE.search(line)
     if loaded is not None:
-        return Place("file", Span(span.end - len(loaded.group(1)), span.end), loaded.group(1))
+        return CompletionPlace("file", Span(span.end - len(loaded.group(1)), span.end), loaded.group(1))
     part = _PART.search(line)
     if part is not None:
-        return Place("part", span, part.group(2))
+        return CompletionPlace("part", span, part.group(2))
     member = _MEMBER.search(line)
     if member is not None:
-        return Place("member", span, member.group(2), member.group(1).rstrip("."))
+        return CompletionPlace("member", span, member.group(2), member.group(1).rstrip("."))
     if _MEASURE.search(line):
-        return Place("measure", span, word)
+        return CompletionPlace("measure", span, word)
     headed = _in_head(line)
     if headed is not None:
-        return Place(headed, span, word)
+        return CompletionPlace(headed, span, word)
     if _NEW.search(line):
-        return Place("new", span, word)
+        return CompletionPlace("new", span, word)
     if _CHANGED.search(line):
-        return Place("changed", span, word)
-    return Place("top" if line == word else "expression", span, word)
+        return CompletionPlace("changed", span, word)
+    return CompletionPlace("top" if line == word else "expression", span, word)
 
 
 def _in_head(line: str) -> Kind | None:

@@ -27,7 +27,7 @@ from potto.syntax import nodes
 from potto.types import Function, Parameter, Type, derivative_type, format_type, groups_of, interface, result_of
 
 
-class Called(Struct, frozen=True):
+class CallAtHand(Struct, frozen=True):
     """What a call is of: its name, its type, how many groups were given before."""
 
     name: str
@@ -61,12 +61,12 @@ def _of_call(db: Database, file: str, offset: int) -> SignatureHelp | None:
     return None
 
 
-def called_at(db: Database, file: str, call: PendingCall) -> Called | None:
+def called_at(db: Database, file: str, call: PendingCall) -> CallAtHand | None:
     """The function that is called, if it has a type: a definition, or a local name."""
     return called_in(db, file, call, chunk_at(db, file, call.function_span.start))
 
 
-def called_in(db: Database, file: str, call: PendingCall, chunk: ChunkAt | None) -> Called | None:
+def called_in(db: Database, file: str, call: PendingCall, chunk: ChunkAt | None) -> CallAtHand | None:
     """The same for a call in a chunk."""
     head, given, derived = call_head(call.function)
     if isinstance(head, nodes.Name):
@@ -81,11 +81,11 @@ def called_in(db: Database, file: str, call: PendingCall, chunk: ChunkAt | None)
     return _derived(target.name, found.type, target.given, target.derived, said, found.plain)
 
 
-def _derived(name: str, type: Type, given: int, derived: int, said: str, plain: tuple[str, ...]) -> Called:
+def _derived(name: str, type: Type, given: int, derived: int, said: str, plain: tuple[str, ...]) -> CallAtHand:
     for _ in range(derived):
         type = derivative_type(type)
     prefix = "d" * derived
-    return Called(prefix + name, type, given, said, tuple(prefix + p for p in plain))
+    return CallAtHand(prefix + name, type, given, said, tuple(prefix + p for p in plain))
 
 
 def _local(db: Database, chunk: ChunkAt, place: int, name: str) -> LocalSymbol | None:
@@ -95,7 +95,7 @@ def _local(db: Database, chunk: ChunkAt, place: int, name: str) -> LocalSymbol |
     return None
 
 
-def _groups(called: Called, call: PendingCall) -> SignatureHelp | None:
+def _groups(called: CallAtHand, call: PendingCall) -> SignatureHelp | None:
     groups = groups_of(called.type)
     if not isinstance(called.type, Function) or called.given >= len(groups):
         return None
@@ -112,7 +112,7 @@ def _groups(called: Called, call: PendingCall) -> SignatureHelp | None:
     return SignatureHelp(signatures, called.given)
 
 
-def _label(called: Called, groups: tuple[tuple[Parameter, ...], ...]) -> tuple[str, list[list[Span]]]:
+def _label(called: CallAtHand, groups: tuple[tuple[Parameter, ...], ...]) -> tuple[str, list[list[Span]]]:
     text, spans = called.name, []
     for group in groups:
         places: list[Span] = []

@@ -25,8 +25,8 @@ from potto.types import (
     Real,
     TupleOf,
     Type,
+    TypeVariable,
     Unknown,
-    Var,
     format_type,
     groups_of,
     interface,
@@ -89,7 +89,7 @@ def _types(db: Database, chunk: ChunkAt, name: str) -> Iterator[InlayHint]:
         if parameter is not None and parameter.annotation is not None:
             continue
         type = public.get(typed.name, typed.type) if parameter is not None else typed.type
-        if isinstance(type, Unknown | Var) or (binder.kind == "parameter" and parameter is None):
+        if isinstance(type, Unknown | TypeVariable) or (binder.kind == "parameter" and parameter is None):
             continue
         if binder.kind != "parameter" and isinstance(type, Real) and not type.variables:
             continue  # a plain number: nothing to say

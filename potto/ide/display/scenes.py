@@ -28,14 +28,14 @@ MOST_CALLS = 100  # of a function that are looked at, and the last one
 _PAIRS = (("x", "y"), ("u", "v"), ("i", "j"))
 
 
-class Given(Struct, frozen=True):
+class GivenValue(Struct, frozen=True):
     """What a call gives to a parameter: the numbers, if they are written out, and its text."""
 
     value: tuple[float, ...] = ()
     text: str = ""
 
 
-Arguments = tuple[tuple[str | int, Given], ...]
+Arguments = tuple[tuple[str | int, GivenValue], ...]
 
 
 class SceneParameter(Struct, frozen=True):
@@ -103,8 +103,8 @@ def scene(db: Database, file: str, name: str) -> Scene | None:
         if kind is None or parameter.name is None:
             return None
         places = parameter.name, len(made)
-        everywhere = [next((call[place] for place in places if place in call), Given()) for call in calls]
-        written = everywhere[0] if everywhere else Given()
+        everywhere = [next((call[place] for place in places if place in call), GivenValue()) for call in calls]
+        written = everywhere[0] if everywhere else GivenValue()
         value = written.value if len(written.value) == size else ()
         usable = fits(db, file, name, parameter.type) if kind == "function" else ()
         if kind == "function" and written.text and not wrong_with(db, file, written.text):
@@ -128,7 +128,7 @@ def scene(db: Database, file: str, name: str) -> Scene | None:
     return Scene(name, NOWHERE, tuple(made), components, axes)
 
 
-def reach(given: list[Given]) -> tuple[float, float] | None:
+def reach(given: list[GivenValue]) -> tuple[float, float] | None:
     """The least and the largest of the single numbers that calls give, if they differ."""
     found = [one.value[0] for one in given if len(one.value) == 1]
     return (min(found), max(found)) if found and min(found) < max(found) else None
@@ -190,7 +190,7 @@ def _called(head: nodes.Expr) -> tuple[str, bool] | None:
     return None
 
 
-def _arguments(given: tuple[nodes.Argument, ...], dual: bool, text: str) -> Iterator[tuple[str | int, Given]]:
+def _arguments(given: tuple[nodes.Argument, ...], dual: bool, text: str) -> Iterator[tuple[str | int, GivenValue]]:
     for place, argument in enumerate(given):
         written, value = argument.value, _constant(argument.value)
         if dual and isinstance(written, nodes.Tuple):
@@ -199,7 +199,7 @@ def _arguments(given: tuple[nodes.Argument, ...], dual: bool, text: str) -> Iter
             case nodes.Apply(_, nodes.Name(_, "deriv"), (derived,), _) if dual:
                 written = derived.value
         key = place if argument.name is None else argument.name[1:] if dual else argument.name
-        yield key, Given(value, text[written.span.start : written.span.end])
+        yield key, GivenValue(value, text[written.span.start : written.span.end])
 
 
 def _constant(expr: nodes.Expr) -> tuple[float, ...]:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from potto.calculus.checking.solvability import Problem
+from potto.calculus.checking.solvability import ConditionProblem
 from potto.checking.check import definition_diagnostics
 from potto.core.printer import format_term
 from potto.core.simplify import simplify
@@ -117,7 +117,7 @@ def _plain(db: Database, chunk: ChunkAt, name: str, condition: nodes.Expr) -> st
 def _judged(db: Database, chunk: ChunkAt, comparison: nodes.Expr) -> str | None:
     """What a comparison over variables of integration is in brackets."""
     verdict = judged(db, chunk, comparison, "map")
-    if isinstance(verdict, Problem):
+    if isinstance(verdict, ConditionProblem):
         return "\n\n".join([f"**no diffeomorphism**: {verdict.message}", *verdict.notes])
     if verdict is None:
         return None

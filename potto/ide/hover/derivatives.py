@@ -12,12 +12,12 @@ from msgspec import Struct
 
 from potto.calculus.checking.conditions import Condition, called_by, conditions_of
 from potto.calculus.checking.diffeo import DiffeoInfo, diffeo_info, exported
-from potto.calculus.checking.solvability import Problem, Verdict, judge
+from potto.calculus.checking.solvability import ConditionProblem, Verdict, judge
 from potto.calculus.explanation.explain import equation, explain_derivative
 from potto.calculus.explanation.layout import DerivativeText, IntegralText
 from potto.calculus.explanation.readable import readable
 from potto.calculus.inlining.currying import parameters_of
-from potto.calculus.solving.inverse_map import Inverse, invert
+from potto.calculus.solving.inverse_map import InverseMap, invert
 from potto.checking.check import has_errors
 from potto.core.printer import format_term
 from potto.core.simplify import simplify
@@ -128,12 +128,12 @@ def _info(
     span: Span,
     coordinates: tuple[Term, ...],
     variables: tuple[str, ...],
-    verdict: Verdict | Problem,
+    verdict: Verdict | ConditionProblem,
     moved: tuple[str, ...],
     calls: tuple[str, ...],
 ) -> ConditionInfo:
     shown, where = _terms(coordinates), shown_equation(coordinates[0])
-    if isinstance(verdict, Problem):
+    if isinstance(verdict, ConditionProblem):
         said = (*verdict.notes, *([verdict.help] if verdict.help else []))
         return ConditionInfo(
             span, variables, shown, where, problem=verdict.message, notes=said, moved_by=moved, calls=calls
@@ -142,7 +142,7 @@ def _info(
     inverse = verdict.inverse
     if inverse is None and len(completed) == len(variables):
         found = invert(completed, variables)
-        inverse = found if isinstance(found, Inverse) else None
+        inverse = found if isinstance(found, InverseMap) else None
     roots = () if verdict.roots is None else tuple(map(_readable, verdict.roots.roots))
     return ConditionInfo(
         span,

@@ -12,10 +12,10 @@ import os.path
 from collections.abc import Iterator, Mapping
 
 from potto.modules import DefinitionTarget, names, resolve
-from potto.modules.lookup import Imported, ModuleTarget, scope
+from potto.modules.lookup import ImportBinding, ModuleTarget, scope
 from potto.modules.workspace import files, module_name
 from potto.query import Database, query
-from potto.types import Diffeo, Parameter, Real, TupleOf, Type, Var, groups_of, interface, result_of
+from potto.types import Diffeo, Parameter, Real, TupleOf, Type, TypeVariable, groups_of, interface, result_of
 from potto.types.types import REAL
 from potto.types.types import resolve as known
 from potto.types.unify import as_tuple, open_type, rebuild, unify
@@ -41,7 +41,7 @@ def fits(db: Database, file: str, name: str, type: Type, elsewhere: bool = True)
 
 def of_numbers(type: Type) -> Type:
     """A type with numbers wherever any type will do: a viewer can set numbers."""
-    return rebuild(type, lambda part: REAL if isinstance(part, Var) else part)
+    return rebuild(type, lambda part: REAL if isinstance(part, TypeVariable) else part)
 
 
 def accepts(wanted: Type, has: Type) -> bool:
@@ -126,7 +126,7 @@ def _own(db: Database, file: str, groups: int) -> Iterator[Fitting]:
 
 def _imported(db: Database, file: str, groups: int) -> Iterator[Fitting]:
     for bound, meaning in scope(db, file).items():
-        target = resolve(db, file, bound) if isinstance(meaning, Imported) else None
+        target = resolve(db, file, bound) if isinstance(meaning, ImportBinding) else None
         if isinstance(target, DefinitionTarget):
             yield bound, target
         elif isinstance(target, ModuleTarget):

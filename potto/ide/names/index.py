@@ -214,7 +214,7 @@ class _Walk:
             case nodes.RecordDefinition():
                 self.add(node.name_span, node.name, "define")
                 return self._headed((node.fields,), node.span, ())
-            case nodes.Inverse():
+            case nodes.DeclaredInverse():
                 return self._headed((node.parameters,), node.span, node.components)
             case nodes.For():
                 number = self.binder(node.variable.name, node.variable.span, "loop", node.span)

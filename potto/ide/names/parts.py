@@ -15,7 +15,7 @@ from potto.modules.graph import owner as defines
 from potto.query import Database
 from potto.source import Span
 from potto.syntax import live_expressions, nodes, parse_expression
-from potto.types.context import Part
+from potto.types.context import NamedPart
 from potto.types.queries import statement_parts, typed_parts
 
 
@@ -50,12 +50,12 @@ def is_part(db: Database, file: str, occurrence: Occurrence) -> bool:
     return occurrence.role == "field"
 
 
-def part_at(db: Database, chunk: ChunkAt, span: Span) -> Part | None:
+def part_at(db: Database, chunk: ChunkAt, span: Span) -> NamedPart | None:
     """What the types know of the name of a part at a place of a chunk."""
     return next((part for part in _parts(db, chunk) if part.span == span), None)
 
 
-def _parts(db: Database, chunk: ChunkAt) -> Iterator[Part]:
+def _parts(db: Database, chunk: ChunkAt) -> Iterator[NamedPart]:
     name, item = owner(db, chunk), chunk.parsed(db).item
     if name is not None:
         yield from typed_parts(db, chunk.file, name)
@@ -64,4 +64,4 @@ def _parts(db: Database, chunk: ChunkAt) -> Iterator[Part]:
     for live in live_expressions(chunk.text) if "#>" in chunk.text else ():
         expr = parse_expression(live.text).expr
         for part in statement_parts(db, chunk.file, nodes.ExpressionStatement(expr.span, expr)):
-            yield Part(part.span.shift(live.text_span.start), part.name, part.whole, part.type)
+            yield NamedPart(part.span.shift(live.text_span.start), part.name, part.whole, part.type)

@@ -1,6 +1,6 @@
 """The points at which definitions are looked at: calls in live expressions and statements, and the slopes there.
 
-Owns `Point`, `points` and `point_of`. These are only texts; whoever evaluates makes numbers of them.
+Owns `CallPoint`, `points` and `point_of`. These are only texts; whoever evaluates makes numbers of them.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ from potto.modules.texts import groups_of_pieces, piece
 from potto.query import Database, query
 from potto.syntax import children, live_expressions, nodes, parse_expression
 from potto.syntax.written import without_parentheses
-from potto.types import Function, Parameter, Real, TupleOf, Type, Var, groups_of, interface, result_of
+from potto.types import Function, Parameter, Real, TupleOf, Type, TypeVariable, groups_of, interface, result_of
 from potto.types.types import resolve
 
 MOST = 3  # points of one definition
 USUAL = "0.5"  # where nothing is said
 
 
-class Point(Struct, frozen=True):
+class CallPoint(Struct, frozen=True):
     """A call with all its arguments. `slopes`: for each parameter, an expression whose tangent is the derivative by it.
     `chosen`: nobody wrote this call, it is an example."""
 
@@ -33,15 +33,15 @@ class Point(Struct, frozen=True):
     chosen: bool = False
 
 
-OfTargets = tuple[tuple[tuple[str, str], Point], ...]  # points, each with the definition that it is one of
+OfTargets = tuple[tuple[tuple[str, str], CallPoint], ...]  # points, each with the definition that it is one of
 
 
 @query
-def points(db: Database, file: str, name: str) -> tuple[Point, ...]:
+def points(db: Database, file: str, name: str) -> tuple[CallPoint, ...]:
     """The points of a definition in its own file; for a constant, its name. If there are none, we choose one."""
     kind = kind_of(db, file, name)
     if kind != "function":
-        return (Point(name),) if kind == "constant" else ()
+        return (CallPoint(name),) if kind == "constant" else ()
     return db.entry(_written, (file,), (file, name)) or _chosen(db, file, name)
 
 
@@ -51,9 +51,9 @@ def looked_at(db: Database, file: str) -> tuple[tuple[str, str], ...]:
 
 
 @query
-def _written(db: Database, file: str) -> Mapping[tuple[str, str], tuple[Point, ...]]:
+def _written(db: Database, file: str) -> Mapping[tuple[str, str], tuple[CallPoint, ...]]:
     """The points in a file's expressions, under the definitions that they are of."""
-    found: dict[tuple[str, str], dict[str, Point]] = {}
+    found: dict[tuple[str, str], dict[str, CallPoint]] = {}
     for group in _points_by_group(db, file):
         for target, point in group:
             those = found.setdefault(target, {})
@@ -94,7 +94,7 @@ def _looking(db: Database, text: str, diffeo: bool) -> tuple[str, ...]:
 
 
 @query(keep=8192)
-def points_in(db: Database, file: str, text: str) -> tuple[tuple[tuple[str, str], Point], ...]:
+def points_in(db: Database, file: str, text: str) -> tuple[tuple[tuple[str, str], CallPoint], ...]:
     """The points in an expression in the scope of a file, each with its definition."""
     made = (_point(db, file, text, call) for call in _calls(parse_expression(text).expr))
     return tuple(found for found in made if found is not None)
@@ -113,21 +113,21 @@ def _calls(node: nodes.Node) -> Iterator[nodes.Apply]:
         yield from _calls(child)
 
 
-def point_of(db: Database, file: str, text: str) -> Point | None:
+def point_of(db: Database, file: str, text: str) -> CallPoint | None:
     """A call in a file's scope as a point; None if it is not a call of a definition with all its arguments."""
     tree = without_parentheses(parse_expression(text).expr)
     made = _point(db, file, text, tree) if isinstance(tree, nodes.Apply) else None
     return None if made is None else made[1]
 
 
-def _chosen(db: Database, file: str, name: str) -> tuple[Point, ...]:
+def _chosen(db: Database, file: str, name: str) -> tuple[CallPoint, ...]:
     groups = groups_of(interface(db, file, name).type)
     usual = [[_usual(db, file, name, parameter.type) for parameter in group] for group in groups]
     written = "".join(f"({', '.join(text or '' for text in group)})" for group in usual)
     if not all(all(group) for group in usual) or name not in names(db, file):
         return ()
     point = point_of(db, file, name + written)
-    return () if point is None else (Point(point.text, point.slopes, chosen=True),)
+    return () if point is None else (CallPoint(point.text, point.slopes, chosen=True),)
 
 
 def _usual(db: Database, file: str, name: str, type: Type) -> str | None:
@@ -135,20 +135,20 @@ def _usual(db: Database, file: str, name: str, type: Type) -> str | None:
     if _is_number(type):
         return USUAL
     if isinstance(resolve(type), Function):
-        said = not isinstance(resolve(result_of(type)), Var)  # whether it is known what it gives
+        said = not isinstance(resolve(result_of(type)), TypeVariable)  # whether it is known what it gives
         return next(iter(fits(db, file, name, type, elsewhere=False)), None) if said else None
     size = numbers(type)
     return f"({', '.join([USUAL] * size)})" if size else None
 
 
 def _is_number(type: Type) -> bool:
-    return isinstance(resolve(type), Real | Var)
+    return isinstance(resolve(type), Real | TypeVariable)
 
 
 # One call
 
 
-def _point(db: Database, file: str, text: str, call: nodes.Apply) -> tuple[tuple[str, str], Point] | None:
+def _point(db: Database, file: str, text: str, call: nodes.Apply) -> tuple[tuple[str, str], CallPoint] | None:
     """A call, or a call of a derivative, as a point of its definition."""
     head, groups = _chain(call)
     called = callee(db, file, head)
@@ -165,7 +165,7 @@ def _point(db: Database, file: str, text: str, call: nodes.Apply) -> tuple[tuple
         return None
     value = function + "".join(f"({', '.join(group)})" for group in whole)
     slopes = tuple(_slopes(function, wanted, whole)) if _has_numbers(result_of(type)) else ()
-    return (called.file, called.name), Point(value, slopes)
+    return (called.file, called.name), CallPoint(value, slopes)
 
 
 def _chain(call: nodes.Expr) -> tuple[nodes.Expr, list[tuple[nodes.Argument, ...]]]:
@@ -236,7 +236,7 @@ def _primal(value: nodes.Expr) -> nodes.Expr | None:
 
 def _has_numbers(type: Type) -> bool:
     type = resolve(type)
-    return isinstance(type, Real | Var) or (isinstance(type, TupleOf) and all(map(_has_numbers, type.items)))
+    return isinstance(type, Real | TypeVariable) or (isinstance(type, TupleOf) and all(map(_has_numbers, type.items)))
 
 
 def _slopes(

@@ -93,7 +93,7 @@ class PartSymbol(Struct, frozen=True):
 Symbol = LocalSymbol | DefinitionSymbol | ModuleSymbol | BuiltinSymbol | MeasureSymbol | PartSymbol
 
 
-class Found(Struct, frozen=True):
+class FoundName(Struct, frozen=True):
     """A name at a place (absolute), and what it means; None if nothing."""
 
     span: Span
@@ -102,7 +102,7 @@ class Found(Struct, frozen=True):
     symbol: Symbol | None
 
 
-def symbol_at(db: Database, file: str, offset: int) -> Found | None:
+def symbol_at(db: Database, file: str, offset: int) -> FoundName | None:
     """The name that an offset touches and its meaning."""
     chunk = chunk_at(db, file, offset)
     if chunk is None:
@@ -112,7 +112,7 @@ def symbol_at(db: Database, file: str, offset: int) -> Found | None:
         return None
     pieces = split(db, chunk.file, whole)
     occurrence = next((o for o in pieces if offset - chunk.start <= o.span.end), whole)
-    return Found(chunk.absolute(occurrence.span), occurrence, chunk, meaning_of(db, chunk, occurrence))
+    return FoundName(chunk.absolute(occurrence.span), occurrence, chunk, meaning_of(db, chunk, occurrence))
 
 
 def definition_at(db: Database, file: str, offset: int) -> tuple[str, str] | None:

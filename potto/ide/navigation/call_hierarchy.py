@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import os.path
 
-from potto.ide.model import Call, CallItem, Location
+from potto.ide.model import CallItem, HierarchyCall, Location
 from potto.ide.names.documents import kind_of, type_text
 from potto.ide.names.places import ChunkAt, chunk_at, owner
 from potto.ide.names.symbols import DefinitionSymbol, home, meaning_of, symbol_at
@@ -37,7 +37,7 @@ def call_item(db: Database, file: str, name: str) -> CallItem:
     return CallItem(name, detail, kind_of(db, file, name), location(db, file, name), (file, name))
 
 
-def incoming_calls(db: Database, file: str, name: str) -> tuple[Call, ...]:
+def incoming_calls(db: Database, file: str, name: str) -> tuple[HierarchyCall, ...]:
     """The definitions and scripts that use a definition, with the places."""
     callers: dict[tuple[str, str], list[Span]] = {}
     scripts: dict[str, ChunkAt] = {}
@@ -48,10 +48,10 @@ def incoming_calls(db: Database, file: str, name: str) -> tuple[Call, ...]:
         if caller is None:
             scripts.setdefault(chunk.file, chunk)
         callers.setdefault((chunk.file, caller or SCRIPT), []).append(chunk.absolute(occurrence.span))
-    found: list[Call] = []
+    found: list[HierarchyCall] = []
     for (where, caller), spans in callers.items():
         item = call_item(db, where, caller) if caller else _script(where, scripts[where])
-        found.append(Call(item, tuple(spans)))
+        found.append(HierarchyCall(item, tuple(spans)))
     return tuple(found)
 
 
@@ -60,7 +60,7 @@ def _script(file: str, chunk: ChunkAt) -> CallItem:
     return CallItem(os.path.basename(file), "script", "module", Location(file, span, span), (file, SCRIPT))
 
 
-def outgoing_calls(db: Database, file: str, name: str) -> tuple[Call, ...]:
+def outgoing_calls(db: Database, file: str, name: str) -> tuple[HierarchyCall, ...]:
     """The definitions that a definition uses, with the places in it."""
     chunk = home(db, file, name) if name in names(db, file) else None
     if chunk is None or definition(db, file, name) is None:
@@ -72,4 +72,4 @@ def outgoing_calls(db: Database, file: str, name: str) -> tuple[Call, ...]:
         symbol = meaning_of(db, chunk, occurrence)
         if isinstance(symbol, DefinitionSymbol):
             callees.setdefault((symbol.file, symbol.name), []).append(chunk.absolute(occurrence.span))
-    return tuple(Call(call_item(db, *target), tuple(spans)) for target, spans in callees.items())
+    return tuple(HierarchyCall(call_item(db, *target), tuple(spans)) for target, spans in callees.items())

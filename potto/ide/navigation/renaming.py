@@ -18,7 +18,7 @@ from potto.ide.names.parts import occurrences, split
 from potto.ide.names.places import ChunkAt, all_chunks
 from potto.ide.names.symbols import (
     BuiltinSymbol,
-    Found,
+    FoundName,
     LocalSymbol,
     MeasureSymbol,
     ModuleSymbol,
@@ -29,7 +29,7 @@ from potto.ide.navigation.moved_files import rename_files
 from potto.ide.navigation.references import occurrences_of
 from potto.modules import find_module, resolve_module, source
 from potto.modules.builtins import is_builtin
-from potto.modules.lookup import Imported, meaning
+from potto.modules.lookup import ImportBinding, meaning
 from potto.modules.workspace import files, mentions
 from potto.query import Database
 from potto.source import Span
@@ -84,13 +84,13 @@ def rename(db: Database, file: str, offset: int, new_name: str) -> Change | Refu
             return _rename_bound(db, found, new_name)
 
 
-def _is_file_name(db: Database, found: Found) -> bool:
+def _is_file_name(db: Database, found: FoundName) -> bool:
     """Whether the name of a module is that of its file, not an alias."""
     if found.occurrence.role in ("module", "import"):
         return True
     bound = meaning(db, found.chunk.file, found.occurrence.name)
     return not (
-        isinstance(bound, Imported) and bound.module.rpartition(".")[2] != found.occurrence.name.rpartition(".")[2]
+        isinstance(bound, ImportBinding) and bound.module.rpartition(".")[2] != found.occurrence.name.rpartition(".")[2]
     )
 
 
@@ -118,7 +118,7 @@ def _rename_local(
 # Definitions
 
 
-def _rename_bound(db: Database, found: Found, new_name: str) -> Change | Refused:
+def _rename_bound(db: Database, found: FoundName, new_name: str) -> Change | Refused:
     start = _refers(db, found.chunk, found.occurrence)
     if start is None:
         return Refused(f"`{found.occurrence.name}` cannot be renamed here")
@@ -161,7 +161,7 @@ def _root(db: Database, start: Bound) -> Bound:
     file, name = start
     while True:
         bound = meaning(db, file, name)
-        if not isinstance(bound, Imported) or bound.name != name:
+        if not isinstance(bound, ImportBinding) or bound.name != name:
             return file, name
         target = find_module(db, file, bound.module)
         if target is None or (target, name) in seen or meaning(db, target, name) is None:
@@ -182,7 +182,7 @@ def _family(db: Database, root: Bound, file: str) -> tuple[Bound, ...]:
             if (each, name) in found:
                 continue
             bound = meaning(db, each, name)
-            if not isinstance(bound, Imported) or bound.name != name:
+            if not isinstance(bound, ImportBinding) or bound.name != name:
                 continue
             target = find_module(db, each, bound.module)
             if target is not None and (target, name) in found:

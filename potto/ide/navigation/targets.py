@@ -13,7 +13,7 @@ from potto.data.mistakes import DataMistake
 from potto.ide.model import Links, Location
 from potto.ide.names.documents import item_span, name_span
 from potto.ide.names.places import NOWHERE, ChunkAt, all_chunks, chunk_at
-from potto.ide.names.symbols import DefinitionSymbol, Found, LocalSymbol, ModuleSymbol, PartSymbol, symbol_at
+from potto.ide.names.symbols import DefinitionSymbol, FoundName, LocalSymbol, ModuleSymbol, PartSymbol, symbol_at
 from potto.modules import DefinitionTarget, dependencies, references, resolve, resolve_member, source
 from potto.modules import definition as tree_of
 from potto.modules.data import data_file
@@ -93,7 +93,7 @@ def implementation(db: Database, file: str, offset: int) -> Links | None:
     return None
 
 
-def place_of(db: Database, found: Found) -> tuple[Location, ...]:
+def place_of(db: Database, found: FoundName) -> tuple[Location, ...]:
     """Where a symbol is bound or defined."""
     match found.symbol:
         case LocalSymbol(chunk, _, binder):
@@ -138,7 +138,7 @@ def _is_map(db: Database, file: str, name: str) -> bool:
     return isinstance(tree_of(db, file, name), nodes.DiffeoDefinition)
 
 
-def _diffeos_of(db: Database, found: Found) -> tuple[Location, ...]:
+def _diffeos_of(db: Database, found: FoundName) -> tuple[Location, ...]:
     """The diffeomorphisms behind a name: itself, what gives its value, or those that a local name stands for."""
     match found.symbol:
         case DefinitionSymbol(file, name):
@@ -171,7 +171,7 @@ def _maps_in(db: Database, chunk: ChunkAt, expr: nodes.Expr) -> tuple[Location, 
     return tuple(places)
 
 
-def _behind(db: Database, found: Found) -> tuple[Location, ...]:
+def _behind(db: Database, found: FoundName) -> tuple[Location, ...]:
     """`f = g` or `f = deriv(g)`: g, however many names there are between."""
     symbol = found.symbol
     if not isinstance(symbol, DefinitionSymbol):

@@ -17,7 +17,7 @@ from msgspec.structs import replace
 
 from potto.calculus.algebra.affine import affine
 from potto.calculus.algebra.ranges import range_of
-from potto.calculus.decomposition.elimination import Step, eliminate
+from potto.calculus.decomposition.elimination import EliminationStep, eliminate
 from potto.calculus.decomposition.surface_cuts import MOST_CENTERS, cut_along, points_of
 from potto.calculus.decomposition.sweep import Level, sweep
 from potto.calculus.surfaces.case_split import cased
@@ -74,7 +74,7 @@ class Eliminated(Struct, frozen=True):
     """The steps, outermost first: the plan of each, and the state that it depends on as a variable from LOW to HIGH,
     cut where its integral is not smooth, with hints where it has a peak; None where it depends on none."""
 
-    steps: tuple[Step, ...]
+    steps: tuple[EliminationStep, ...]
     plans: tuple[Plan, ...]
     states: tuple[LevelPlan | None, ...]
 
@@ -113,7 +113,7 @@ def _state(name: str, places: Sequence[Place]) -> LevelPlan:
 
 
 def _planned(
-    step: Step, further: Sequence[Place], state: str, resolve: Resolve, centers: Iterable[Finding]
+    step: EliminationStep, further: Sequence[Place], state: str, resolve: Resolve, centers: Iterable[Finding]
 ) -> tuple[Plan, tuple[Place, ...]] | None:
     """The plan of one step, and where its integral is not smooth in its state.
 
@@ -247,14 +247,14 @@ def _jumps_at_an_end(found: Cuts, function: Callable[[Array, Array], Sums]) -> b
     return bool(does_jump(np.abs(above - below), np.abs(above[:, 1]) + np.abs(below[:, 1])).any())
 
 
-def _spans(steps: Sequence[Step], env: dict[str, Value]) -> list[tuple[float, float]]:
+def _spans(steps: Sequence[EliminationStep], env: dict[str, Value]) -> list[tuple[float, float]]:
     """Between which numbers the state of each step is."""
     box: dict[str, tuple[float, float]] = {}
     for name, value in env.items():
         if isinstance(value, Cell):
             box[name] = (float(np.ravel(value.v)[0]),) * 2
     spans: list[tuple[float, float]] = []
-    before: Step | None = None
+    before: EliminationStep | None = None
     for step in steps:
         span = (-np.inf, np.inf)
         if step.state is not None and before is not None and before.passed is not None:
@@ -266,7 +266,7 @@ def _spans(steps: Sequence[Step], env: dict[str, Value]) -> list[tuple[float, fl
     return spans
 
 
-def _span(step: Step, passed: Term, box: dict[str, tuple[float, float]]) -> tuple[float, float]:
+def _span(step: EliminationStep, passed: Term, box: dict[str, tuple[float, float]]) -> tuple[float, float]:
     """Between which numbers is what a step passes on: what is affine in the variable has its extremes at the bounds."""
     found, at_bounds = range_of(passed, box), _at_bounds(step, passed)
     if not at_bounds:
@@ -276,7 +276,7 @@ def _span(step: Step, passed: Term, box: dict[str, tuple[float, float]]) -> tupl
 
 
 @lru_cache(maxsize=1024)
-def _at_bounds(step: Step, passed: Term) -> tuple[Term, ...]:
+def _at_bounds(step: EliminationStep, passed: Term) -> tuple[Term, ...]:
     """What is passed on at both bounds, where it is affine in the variable; else nothing."""
     if affine(passed, (step.variable,)) is None:
         return ()

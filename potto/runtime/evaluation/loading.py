@@ -10,7 +10,7 @@ import numpy as np
 from potto.core.terms import Data
 from potto.data.files import digest, read, values_of
 from potto.data.mistakes import DataMistake
-from potto.data.values import Array, Row, Table
+from potto.data.values import Array, NumberRow, Table
 from potto.diagnostics import PottoError
 from potto.kernels import errors
 from potto.kernels.cells import Cell, Rows, Value
@@ -44,7 +44,7 @@ def _wrong(path: Path, mistake: DataMistake) -> PottoError:
 def _rows(array: Array) -> Value:
     numbers: Any = np.asarray(array.values)
     item: Value = Cell(np.ascontiguousarray(numbers))
-    if isinstance(array.item, Row):
+    if isinstance(array.item, NumberRow):
         item = tuple(Cell(np.ascontiguousarray(numbers[..., place])) for place in range(array.item.length))
     for size in reversed(array.dimensions):
         item = Rows(item, size)

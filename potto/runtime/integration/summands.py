@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from msgspec import Struct
 
-from potto.calculus.inlining.alike import Alike, Leaf, alike
+from potto.calculus.inlining.alike import Leaf, SameShape, alike
 from potto.core.terms import Const, Integral, Lam, Term, Var
 from potto.diagnostics import PottoError
 from potto.integrate.columns import distinct
@@ -35,7 +35,7 @@ FUNCTION = "function"
 
 
 class Batch(Struct, frozen=True):
-    """Summands of one shape, as `Alike` has them, with columns of nothing but numbers as arrays."""
+    """Summands of one shape, as `SameShape` has them, with columns of nothing but numbers as arrays."""
 
     function: Lam
     columns: tuple[Array | tuple[Leaf, ...] | str, ...]
@@ -96,7 +96,7 @@ def _flat(shape: object) -> tuple[object, ...]:
     return tuple(part for item in shape for part in _flat(item)) if isinstance(shape, tuple) else (shape,)
 
 
-def _batch(group: Alike) -> Batch:
+def _batch(group: SameShape) -> Batch:
     def column(leaves: tuple[Leaf, ...] | str) -> Array | tuple[Leaf, ...] | str:
         if isinstance(leaves, str) or any(isinstance(leaf, Var) for leaf in leaves):
             return leaves

@@ -61,7 +61,7 @@ class Raised(Struct, frozen=True):
     exponent: Box
 
 
-class Root(Struct, frozen=True):
+class SquareRoot(Struct, frozen=True):
     """A square root."""
 
     inner: Box
@@ -84,7 +84,7 @@ class Cases(Struct, frozen=True):
     orelse: Box
 
 
-Box = Word | Row | Fenced | Fraction | Raised | Root | Big | Cases
+Box = Word | Row | Fenced | Fraction | Raised | SquareRoot | Big | Cases
 
 
 def boxes(text: str, tangents: Container[str]) -> Box | None:
@@ -225,7 +225,7 @@ class _Boxes:
         if isinstance(head, nodes.Name) and len(arguments) == 1:
             match head.id:
                 case "sqrt":
-                    return Root(self.of(arguments[0]))
+                    return SquareRoot(self.of(arguments[0]))
                 case "abs":
                     return Fenced("|", self.of(arguments[0]), "|")
                 case "deriv" if isinstance(arguments[0], nodes.Name):

@@ -10,7 +10,19 @@ from collections.abc import Container
 
 from msgspec.structs import replace
 
-from potto.syntax.typesetting.boxes import GREEK, Big, Box, Cases, Fenced, Fraction, Raised, Root, Row, Word, boxes
+from potto.syntax.typesetting.boxes import (
+    GREEK,
+    Big,
+    Box,
+    Cases,
+    Fenced,
+    Fraction,
+    Raised,
+    Row,
+    SquareRoot,
+    Word,
+    boxes,
+)
 
 _LETTERS = {symbol: name for name, symbol in GREEK.items() if name != "inf"} | {
     "Γ": "Gamma", "Δ": "Delta", "Θ": "Theta", "Λ": "Lambda", "Ξ": "Xi", "Π": "Pi", "Σ": "Sigma", "Φ": "Phi",
@@ -61,7 +73,7 @@ def _text(box: Box) -> str:
         case Raised(base=base, exponent=exponent):
             foot = rf"\left({_text(base)}\right)" if isinstance(base, Row | Raised) else _text(base)
             return f"{foot}^{{{_text(exponent)}}}"
-        case Root(inner=inner):
+        case SquareRoot(inner=inner):
             return rf"\sqrt{{{_text(inner)}}}"
         case Big(sign=sign, limits=limits, body=body, last=last):
             big = r"\int" if sign == "∫" else r"\sum"

@@ -8,7 +8,7 @@ from __future__ import annotations
 import html
 from collections.abc import Container
 
-from potto.syntax.typesetting.boxes import Big, Box, Cases, Fenced, Fraction, Raised, Root, Row, Word, boxes
+from potto.syntax.typesetting.boxes import Big, Box, Cases, Fenced, Fraction, Raised, Row, SquareRoot, Word, boxes
 
 
 def mathml(text: str, tangents: Container[str] = ()) -> str:
@@ -30,7 +30,7 @@ def _text(box: Box) -> str:
             return f"<mfrac>{_text(top)}{_text(below)}</mfrac>"
         case Raised(base=base, exponent=exponent):
             return f"<msup>{_text(base)}{_text(exponent)}</msup>"
-        case Root(inner=inner):
+        case SquareRoot(inner=inner):
             return f"<msqrt>{_text(inner)}</msqrt>"
         case Big(sign=sign, limits=limits, body=body, last=last):
             tag = "msubsup" if sign == "∫" else "munderover"

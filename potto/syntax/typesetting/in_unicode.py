@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Container
 
-from potto.syntax.typesetting.boxes import Big, Box, Cases, Fenced, Fraction, Raised, Root, Row, Word, boxes
+from potto.syntax.typesetting.boxes import Big, Box, Cases, Fenced, Fraction, Raised, Row, SquareRoot, Word, boxes
 
 _ABOVE = str.maketrans("0123456789-−", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻⁻")
 _BELOW = str.maketrans("0123456789-−", "₀₁₂₃₄₅₆₇₈₉₋₋")
@@ -38,7 +38,7 @@ def _text(box: Box) -> str:
             if _SMALL.fullmatch(power):
                 return f"{below}{power.translate(_ABOVE)}"
             return f"{below}^{power}" if isinstance(exponent, Word) else f"{below}^({power})"
-        case Root(inner=inner):
+        case SquareRoot(inner=inner):
             text = _text(inner)
             return f"√{text}" if isinstance(inner, Word) else f"√({text})"
         case Big():

@@ -13,7 +13,7 @@ from msgspec.structs import asdict
 
 from potto.applications.fitting import by_fields
 from potto.applications.fitting import fit as fitted
-from potto.applications.minimizing import MOST_TOLD, Step
+from potto.applications.minimizing import MOST_TOLD, Iterate
 from potto.applications.pictures import course
 from potto.projects.settings import settings
 from potto.python.functions import Function
@@ -56,7 +56,7 @@ def fit(session: Conversation, text: str) -> Iterator[Part]:
         session.progress(f"fitting {name}")
     values = {n: _start(session, n, value) for n, value in start.items()}
 
-    def told(step: Step) -> None:
+    def told(step: Iterate) -> None:
         if session.progress is not None and time.perf_counter() - begun > PATIENCE:
             value, slope = format_digits(step.value), format_error(step.slope)
             session.progress(f"step {step.number}, value {value}, slope {slope}")
