@@ -87,6 +87,23 @@ def test_what_a_line_cuts_off_a_pixel(at: float, beyond: float, converged: bool,
     assert found.converged == converged, found.summary()
 
 
+@pytest.mark.parametrize("scale", [1.0, 1e-30, 1e3])
+@pytest.mark.parametrize(("at", "body"), [(0.7, "x*0.3 + y"), (0.3, "x*0.3 + y"), (0.123, "1.1*x + 0.7*y")])
+def test_what_a_line_sweeps_over_at_a_corner_that_it_touches(at: float, body: str, scale: float) -> None:
+    """It passes the corner by a unit in the last place: what it sweeps over is 0 beside the 0.01 that it could."""
+    square = f"[{at!r}, {at + 0.01!r}]"
+    f = potto.compile(f"def f(c)\n    integral ({square}, {square}) {scale!r}*[{body} < c] d(x, y)").f
+    p, q = (0.3, 1.0) if "0.3" in body else (1.1, 0.7)
+    level = p * at + q * at + 1e-16
+    found = potto.deriv(f)((level, 1.0))
+    with mp.workdps(50):
+        length = (mp.mpf(level) - mp.mpf(p) * mp.mpf(at) - mp.mpf(q) * mp.mpf(at)) / mp.mpf(p) / mp.mpf(q)
+    # 2^-50: what the rounding of the level itself moves, as for pixels at corners
+    assert abs(found.tangent - scale * length) <= found.tangent_error + scale * 2.0**-50
+    assert found.converged, found.reasons
+    assert not potto.deriv(f)((level + 1e-9, 1.0)).converged  # that is no zero any more, and has few digits
+
+
 def test_the_rounding_of_a_density_beside_a_turning_place_counts() -> None:
     """lgamma(500) is 2,604, so that the density of beta(200, 300) has 13 digits; at x = 0 it ends like x^199.
 

@@ -73,7 +73,7 @@ class Iteration(Struct):
 
     def whole(self, env: dict[str, Value], batch: int) -> Sums:
         """The integrals of a batch over all variables, with what they could come to at most counted as added up."""
-        self.extent = Extent(len(self.plan.levels), batch)
+        self.extent = Extent(len(self.plan.levels), self.machine.directions, batch)
         sums = self.run(0, env, batch, {}, self.machine)
         self.extent.count(sums)
         return sums
