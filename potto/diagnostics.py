@@ -129,10 +129,10 @@ class PottoError(Exception):
         self.met.append(met)
         return self
 
-    def beside(self, related: Related) -> PottoError:
+    def beside(self, related: Related) -> Self:
         """The same error with another place that its first message talks about, which had none but its own."""
         first, *rest = self.diagnostics
-        return PottoError([replace(first, related=(*first.related, related)), *rest])
+        return type(self)([replace(first, related=(*first.related, related)), *rest])
 
     def __reduce__(self) -> tuple[object, ...]:
         return type(self), (self.diagnostics,)

@@ -18,6 +18,11 @@ NO_MEANING = declare("P0508", "a delta outside of an integral")
 WRONG_CALL = declare("P0509", "a function called with values that do not fit it")
 
 
+class Coincidence(PottoError):
+    """A second derivative is asked for where a surface is met outside of integrals (P0505): there is none, unless
+    nothing jumps across it (`runtime/evaluation/sides`)."""
+
+
 def not_a_number(value: object) -> PottoError:
     kind = _KINDS.get(type(value).__name__, "a function")
     return PottoError([NOT_A_NUMBER(NOWHERE, f"{kind} stands where a number is needed")])

@@ -16,10 +16,11 @@ def _quotient_partials(a: Term, b: Term) -> Terms:
 
 
 def _power_partials(base: Term, exponent: Term) -> Terms:
-    # Where the exponent is 0 the power is 1 everywhere, but 0 * base^(-1) is nan at base 0; where the base is 0 the
-    # power stays 0 as a positive exponent moves, but 0 * log(0) is nan.
+    # Where the exponent is 0 the power is 1 everywhere, but 0 * base^(-1) is nan at base 0; where the power is 0 it
+    # stays so as a positive exponent moves, but 0 * log(0) is nan. At 0^0 it falls from infinity by 1 to 0.
+    power = prim("pow", base, exponent)
     by_base = if_(prim("eq", exponent, ZERO), ZERO, mul(exponent, pow_(base, sub(exponent, ONE))))
-    by_exponent = if_(prim("eq", base, ZERO), ZERO, mul(prim("pow", base, exponent), prim("log", base)))
+    by_exponent = if_(prim("eq", power, ZERO), ZERO, mul(power, prim("log", base)))
     return by_base, by_exponent
 
 

@@ -108,7 +108,7 @@ class Program:
 
     def placed(self, error: PottoError) -> PottoError:
         """An error of evaluation with the place in a definition where it was met, if it is known."""
-        if not error.met or self.places is None or type(error) is not PottoError:  # others know their place
+        if not error.met or self.places is None or type(error) not in (PottoError, errors.Coincidence):  # they know it
             return error
         related = self.places(error.met, self.linker.terms)
         return error if related is None else error.beside(related)

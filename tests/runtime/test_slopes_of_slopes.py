@@ -51,3 +51,57 @@ def test_powers_of_a_negative_base_by_an_exponent_that_stands_still(backend: Any
         assert abs(inside.tangent + 4 / 3) <= inside.tangent_error <= 1e-12
         mixed = potto.hessian(m.f, ["x", "n"])(-2.0, 3.0)
         assert abs(mixed.value[0, 0] + 12) <= 1e-14 and not mixed.converged and np.isnan(mixed.value[0, 1])
+
+
+ANGLE = "def f(x, y) atan2(y, x)"
+
+
+@pytest.mark.parametrize("x", [1e-3, 0.3, 1.0, 2.0])
+def test_second_derivatives_on_the_side_of_the_origin_where_an_angle_does_not_jump(x: float) -> None:
+    """They are (2xy, y^2 - x^2, -2xy)/(x^2 + y^2)^2, to some roundings of 1/x^2."""
+    matrix = potto.hessian(potto.compile(ANGLE).f, ["x", "y"])(x, 0.0)
+    exact = np.array([[0, -1], [-1, 0]]) / x**2
+    assert (np.abs(matrix.value - exact) <= matrix.error + 4e-16 / x**2).all() and (matrix.error <= 1e-14 / x**2).all()
+    assert matrix.converged and not matrix.notes
+
+
+def test_a_batch_of_which_some_members_lie_on_the_axis() -> None:
+    x, y = np.array([1.0, 2.0, 0.5]), np.array([0.0, 0.5, 0.0])
+    matrix = potto.hessian(potto.compile(ANGLE).f, ["x", "y"])(x, y)
+    exact = np.array([[2 * x * y, y**2 - x**2], [y**2 - x**2, -2 * x * y]]) / (x**2 + y**2) ** 2
+    assert (np.abs(np.moveaxis(matrix.value, 0, -1) - exact) <= 1e-14).all() and matrix.converged
+
+
+def test_so_with_a_branch_whose_sides_agree_to_the_second_order() -> None:
+    matrix = potto.hessian(potto.compile("def f(x, y) [x > 0]*x^3 + y^2").f, ["x", "y"])(0.0, 1.0)
+    assert matrix.value.tolist() == [[0, 0], [0, 2]] and matrix.converged
+
+
+@pytest.mark.parametrize(
+    ("body", "at"),
+    [
+        ("atan2(y, x)", (-1.0, 0.0)),
+        ("atan2(y, x)", (0.0, 0.0)),
+        ("[x > 0]*x + y^2", (0.0, 1.0)),
+        ("[x > 0]*x^2 + y^2", (0.0, 1.0)),
+        ("[x > 0]*y^2 + x", (0.0, 0.0)),  # nothing jumps along x or y, but the second derivative by y, across
+        ("(integral [0, 1] [u < x]*[u < 2*x - 1/2] d(u))*y", (0.5, 1.0)),
+    ],
+)
+def test_there_is_none_where_sides_differ(body: str, at: tuple[float, float]) -> None:
+    with pytest.raises(potto.PottoError) as caught:
+        potto.hessian(potto.compile(f"def f(x, y) {body}").f, ["x", "y"])(*at)
+    assert caught.value.diagnostics[0].code == "P0505"
+
+
+def test_derivatives_of_a_power_of_nothing() -> None:
+    """0^y is infinite below y = 0, 1 at it and 0 above: the slope by y was 0. So was that of y*x^(y - 1), at y = 1."""
+    f = potto.compile("def f(x, y) x^y").f
+    slopes = potto.grad(f, ["x", "y"])(0.0, 0.0)
+    assert slopes.tangent[0] == 0 and slopes.tangent[1] == -np.inf
+    none = potto.hessian(f, ["x", "y"])(0.0, 0.0)
+    assert not none.converged and none.error[1, 1] == np.inf
+    assert potto.hessian(f, ["x", "y"])(0.0, 1.0).value[0, 1] == -np.inf
+    for y in (2.0, 2.5, 3.0):  # what is like x^(y - 1)*log(x) vanishes at x = 0
+        matrix = potto.hessian(f, ["x", "y"])(0.0, y)
+        assert matrix.value.tolist() == [[2.0 * (y == 2), 0], [0, 0]] and matrix.converged

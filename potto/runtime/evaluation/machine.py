@@ -336,7 +336,7 @@ class Machine:
         if met and not self.root and STRAY * met < np.size(surface):
             self.note(MEETINGS)  # at single nodes: the apex of a cone
         elif met:
-            raise PottoError([PRODUCT_OF_DELTAS(
+            raise (errors.Coincidence if self.root else PottoError)([PRODUCT_OF_DELTAS(
                 errors.NOWHERE,
                 "the second derivative does not exist here: two surfaces coincide, or one passes through a corner",
                 notes=("it would hold a product of deltas on the same surface",),

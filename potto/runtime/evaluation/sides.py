@@ -29,6 +29,7 @@ from potto.kernels.cells import (
     map_cells,
     pad,
 )
+from potto.kernels.errors import Coincidence
 from potto.runtime.evaluation.beside import SAME as ALIKE
 from potto.runtime.evaluation.beside import Parts, approached, moved, one_direction, parameter_step
 from potto.runtime.evaluation.linker import Linker
@@ -38,17 +39,25 @@ DEEPEST = 20  # definitions that a call may lead through
 Run = Callable[[Machine, Value], Value]
 Side = tuple[Array, Array]  # the tangents of all numbers, (numbers, directions, …), and how far off they may be
 Sides = tuple[Side, Side]
+ASKEW = 0.6180339887498949  # of the golden ratio: no multiple comes near a whole number
 SAME = 1e-12  # how far apart the derivatives on both sides may be beside their errors, as a part of them
 
 
 def as_a_whole(machine: Machine, term: Term, given: Value, run: Run) -> Value:
     """What `run` gives for a machine and what is given, the value of a term or what the functions that it is give.
     Where parts have two derivatives, those of the whole on both sides are found: if they are the same, that is the
-    derivative, else the nearer one is, and a note tells them.
+    derivative, else the nearer one is, and a note tells them. Raises PottoError (P0505) where a second derivative is
+    asked for just where something jumps that has not the same one on both sides.
     """
     record = machine.record
     before = record.met, len(record.edges)
-    value = run(machine, given)
+    try:
+        value = run(machine, given)
+    except Coincidence as coincide:
+        if machine.side or machine.taping:
+            raise
+        del record.edges[before[1] :]
+        return _across(machine, given, run, coincide)
     met = record.edges[before[1] :]
     within = all(edge.cause.variable for edge in met)  # what an integral has met, none of the numbers that it is given
     if not met or machine.side or machine.taping or (within and _one_integral(machine.linker, term)):
@@ -70,6 +79,38 @@ def as_a_whole(machine: Machine, term: Term, given: Value, run: Run) -> Value:
         record.edges.append(_note(met[0].cause, two, slopes.shape, there, sides))
     rows = iter(zip(slopes, off, strict=True))
     return map_cells(value, lambda cell: Cell(cell.v, cell.e, *map(tuple, next(rows))))
+
+
+def _across(machine: Machine, given: Value, run: Run, coincide: Coincidence) -> Value:
+    """The value where a surface is met across which nothing jumps, as that of the cut of `atan2` right of the origin.
+
+    Second derivatives by each parameter are those of the branch that is taken. They are the same on the other side if
+    in a direction that no surface runs along what lies beside the parameters leads to what they come to, on both sides.
+    """
+    batch, known = _batch(given), len(machine.record.edges)
+    value = pad(run(machine.changed(aside=True), given), machine.directions)
+    v, e, slopes, off = _numbers(value, machine.directions, batch)
+    del machine.record.edges[known:]
+    weights = 0.5 + ASKEW * np.arange(1, machine.directions + 1) % 1
+    here = v, e, *(np.einsum("nd...,d->n...", rows, weights)[:, None] for rows in (slopes, off))
+    try:
+        sides = _both(
+            machine.with_directions(1), map_cells(given, lambda cell: _mixed(cell, weights)), None,
+            lambda own, moving, side: _led_to(own, moving, run, here, side),
+        )  # fmt: skip
+    except PottoError:
+        raise coincide from None
+    size = ALIKE * np.max(np.abs(slopes), axis=(0, 1))
+    for t, et in sides:
+        if not ((here[3] + et <= size) & (np.abs(t - here[2]) <= size)).all():
+            raise coincide
+    return value
+
+
+def _mixed(cell: Cell, weights: Array) -> Cell:
+    """A number that moves in one direction alone, made of all of its directions."""
+    rows = [w * t for w, t in zip(weights, cell.t, strict=True) if t is not None] if cell.t else []
+    return Cell(cell.v, cell.e, (sum(rows) if rows else None,), (None,))
 
 
 def _few(met: Any, batch: tuple[int, ...]) -> Ints | None:
