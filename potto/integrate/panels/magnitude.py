@@ -45,10 +45,11 @@ class Extent:
         derivatives all of the most, of which rounding of a surface's place is a larger part, the smaller the domain."""
         if sums.gross is None:
             return
-        if (zero := (np.abs(sums.v) <= sums.e).all(axis=0)).any():
+        zero, still = (np.asarray((np.abs(x) <= off).all(axis=0)) for x, off in ((sums.v, sums.e), (sums.t, sums.et)))
+        if zero.any():
             _count(sums.gross[0], ROUNDING * self.reach.prod(axis=0) * self.height, zero)
-        if (still := (np.abs(sums.t) <= sums.et).all(axis=0)).any():
-            _count(sums.gross[1], self.swept(still), still.any(axis=0))
+        if still.any():
+            _count(sums.gross[1], self.swept(still), np.asarray(still.any(axis=0)))
 
     def swept(self, still: Bools) -> Array:
         """The most that surfaces could sweep over in directions (k, B): across one variable, along all the others."""

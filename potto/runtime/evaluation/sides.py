@@ -91,7 +91,7 @@ def _across(machine: Machine, given: Value, run: Run, coincide: Coincidence) -> 
     value = pad(run(machine.changed(aside=True), given), machine.directions)
     v, e, slopes, off = _numbers(value, machine.directions, batch)
     del machine.record.edges[known:]
-    weights = 0.5 + ASKEW * np.arange(1, machine.directions + 1) % 1
+    weights: Array = 0.5 + ASKEW * np.arange(1.0, machine.directions + 1.0) % 1
     here = v, e, *(np.einsum("nd...,d->n...", rows, weights)[:, None] for rows in (slopes, off))
     try:
         sides = _both(
