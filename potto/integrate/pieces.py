@@ -287,9 +287,10 @@ def together(env: dict[str, Value], rows: Array, name: str = INTO) -> Array:
     place = into.v.astype(np.int64)
     if place.max(initial=0) > STRAY * place.size:  # a few members of a large batch
         place = np.unique(place, return_inverse=True)[1]
-    flat = rows.reshape(-1, place.size)
-    added: list[Array] = [np.bincount(place, row)[place] for row in flat]  # type: ignore[misc]
-    return np.stack(added).reshape(rows.shape) if added else rows
+    added = np.empty(rows.shape)
+    for row, own in zip(rows.reshape(-1, place.size), added.reshape(-1, place.size), strict=True):
+        np.bincount(place, row).take(place, out=own, mode="clip")
+    return added
 
 
 def added_up(env: dict[str, Value], tangents: Array, errors: Array, rtol: float) -> Bools:

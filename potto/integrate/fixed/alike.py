@@ -18,7 +18,7 @@ import numpy as np
 from potto.integrate.fixed.moving_sums import evaluated
 from potto.integrate.fixed.product_rule import CANCELS, FEW, Rule
 from potto.integrate.fixed.proved_shapes import proved_rules
-from potto.integrate.fixed.straight import ROW_BITS, RowNumbers, Straight
+from potto.integrate.fixed.straight import Straight
 from potto.integrate.fixed.topologies import Alike, topologies
 from potto.integrate.pieces import Evaluator, Sums, added_up, gather, together
 from potto.kernels.cells import Array, Bools, Cell, Ints, Value
@@ -84,23 +84,40 @@ def _of_one_form(
                 return None
     if not done.any():
         return None
-    number, truncated, rounding, gross = total
-    whole, added = np.abs(number), together(env, gross.max(axis=0))
-    whole[0] = np.abs(together(env, number[0]))
-    asked = np.maximum(machine.atol, machine.rtol * whole)
-    most = CANCELS * added if batch > 1 else 0.0  # for one there are other ways
-    left = np.maximum(most, min(machine.rtol, ROUNDED) * np.minimum(added, 1.0)) if batch > 1 else 0.0
-    error = truncated + rounding
-    fine = rounding <= np.maximum(asked - truncated, left)
-    fine[1:] |= added_up(env, number[1:], rounding[1:], 0.5 * machine.rtol)
-    fine &= truncated <= np.maximum(0.5 * asked, most)
-    done &= fine.all(axis=0)
+    done &= _fine(machine, env, total)
     if not done.any():
         return None
+    number, truncated, rounding, gross = total
+    error = np.add(truncated, rounding, out=truncated)
     added = np.stack((gross[0], gross[1:].max(axis=0, initial=0.0)))
-    for part in (number, error, added):
-        part[:, ~done] = 0.0
+    if not done.all():
+        for part in (number, error, added):
+            part[:, ~done] = 0.0
     return done, Sums(number[None, 0], error[None, 0], number[None, 1:], error[None, 1:], gross=added)
+
+
+def _fine(machine: Evaluator, env: dict[str, Value], total: Sequence[Array]) -> Bools:
+    """Which members are as accurate as was asked for, by what was found for each: (1 + k, B) four times. Over large
+    batches it is memory that takes time: what does for most is asked first."""
+    number, truncated, rounding, gross = total
+    whole = np.abs(number)
+    whole[0] = np.abs(together(env, number[0]))
+    asked = np.maximum(machine.atol, np.multiply(whole, machine.rtol, out=whole), out=whole)
+    fine = 2.0 * (truncated + rounding) <= asked
+    rest = np.flatnonzero(~fine.all(axis=0))
+    if not rest.size:
+        return np.ones(number.shape[1], dtype=bool)
+    several = number.shape[1] > 1  # for one there are other ways
+    added = together(env, gross.max(axis=0)).take(rest)
+    most = CANCELS * added if several else 0.0
+    left = np.maximum(most, min(machine.rtol, ROUNDED) * np.minimum(added, 1.0)) if several else 0.0
+    asked, cut, off = (part.take(rest, 1) for part in (asked, truncated, rounding))
+    known = off <= np.maximum(asked - cut, left)
+    known[1:] |= added_up(env, number[1:], rounding[1:], 0.5 * machine.rtol).take(rest, 1)
+    known &= cut <= np.maximum(0.5 * asked, most)
+    found = np.ones(number.shape[1], dtype=bool)
+    found[rest] = known.all(axis=0)
+    return found
 
 
 def _settled(
@@ -109,11 +126,10 @@ def _settled(
 ) -> Bools:  # fmt: skip
     """Add the integrals over cells of one shape to those of their members; for which of them that could be done."""
     fine = np.zeros(cell.members.size, dtype=bool)
-    between = _between(cell.rows)
-    todo = np.argsort(between, kind="stable")
+    todo = np.arange(cell.members.size)
     exact = [None if d is None else d // 2 + 1 for d in degrees] or [None] * len(plan.variables)
     if None in exact:
-        rules, todo = proved_rules(plan, exact, machine, env, cell, todo, between)
+        rules, todo = proved_rules(plan, exact, machine, env, cell)
         left = [_applied(rule, env, those, total, fine) for rule, those in rules]
         todo = np.concatenate((*left, todo))
         if not todo.size:
@@ -128,6 +144,8 @@ def _settled(
 def _applied(rule: Rule, env: dict[str, Value], todo: Ints, total: Sequence[Array], fine: Bools) -> Ints:
     """Add what a rule gives for some of its cells, where it is good enough, and note that; those for which it isn't."""
     step, left = max(1, POINTS // rule.span(env)), []
+    if not rule.native(env):
+        todo = todo[np.argsort(rule.cell.between.take(todo), kind="stable")]
     for start in range(0, todo.size, step):
         index = todo[start : start + step]
         found = rule.applied(env, index)
@@ -135,24 +153,17 @@ def _applied(rule: Rule, env: dict[str, Value], todo: Ints, total: Sequence[Arra
         parts = [found.number, found.truncated, found.rounding, found.gross]
         if not good.all():
             left.append(index[~good])
-            index, parts = index[good], [part[:, good] for part in parts]
-        fine[index] = True
-        owners = rule.cell.members[index]
+            for part in parts:
+                part[:, ~good] = 0.0
+        fine[index] = good
+        owners = rule.cell.members.take(index)
+        first, last = int(owners.min()), int(owners.max()) + 1
+        owners -= first
         for whole, part in zip(total, parts, strict=True):
-            for row, numbers in zip(whole, part, strict=True):
+            for row, numbers in zip(whole[:, first:last], part, strict=True):
                 if numbers.any():
                     row += np.bincount(owners, numbers, row.size)
     return np.concatenate(left) if left else todo[:0]
-
-
-def _between(rows: RowNumbers) -> RowNumbers:
-    """A number for the rows (variables, 2, M) between which cells lie. In its order neighbours lie between the same
-    cuts, which numpy then takes whole."""
-    digits = rows.reshape(-1, rows.shape[-1])
-    number = np.zeros(rows.shape[-1], dtype=np.int64)
-    for row in digits:
-        number = (number << ROW_BITS) | row
-    return number.astype(np.uint16) if len(digits) * ROW_BITS <= 16 else number  # sorts in one pass
 
 
 def _tried(

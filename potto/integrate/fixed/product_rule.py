@@ -66,9 +66,13 @@ class Rule(Struct, frozen=True):
     def lowered(self, env: dict[str, Value]) -> LoweredCells:
         return lowered_cells(self.plan, self.cell.face, self.machine.directions, env)
 
+    def native(self, env: dict[str, Value]) -> bool:
+        """Whether this is for machine code now."""
+        return self.lowered(env).function(self.machine) is not None
+
     def span(self, env: dict[str, Value]) -> int:
         """How many numbers of a member are kept at a time: those at all nodes, or of coefficients alone."""
-        if self.lowered(env).function(self.machine) is None:
+        if not self.native(env):
             return self.nodes
         return sum(len(asked) for asked in self.asked)
 

@@ -18,7 +18,7 @@ from msgspec import Struct
 from potto.integrate.columns import distinct
 from potto.integrate.fixed.product_rule import Rule
 from potto.integrate.fixed.regions import LOOSEST, MARGIN, MOST_REGIONS
-from potto.integrate.fixed.straight import RowNumbers, Straight
+from potto.integrate.fixed.straight import Straight
 from potto.integrate.fixed.topologies import Alike
 from potto.integrate.pieces import Evaluator
 from potto.integrate.rules.proved_orders import Cell as Stretch
@@ -56,17 +56,16 @@ class _Proved(Struct, frozen=True):
 
 
 def proved_rules(
-    plan: Straight, exact: Sequence[int | None], machine: Evaluator, env: dict[str, Value], cell: Alike, index: Ints,
-    between: RowNumbers,
-) -> tuple[list[tuple[Rule, Ints]], Ints]:  # fmt: skip
+    plan: Straight, exact: Sequence[int | None], machine: Evaluator, env: dict[str, Value], cell: Alike
+) -> tuple[list[tuple[Rule, Ints]], Ints]:
     """Rules with the cells that they are for, and the cells for which there are none.
 
-    exact: the nodes of variables in which the integrand is a polynomial. index: of the cells, in the order of
-    `between`, which says between which rows each lies.
+    exact: the nodes of variables in which the integrand is a polynomial.
     """
+    index = np.argsort(cell.between, kind="stable")
     if index.size < 2 * LEAST or any(map(any, cell.turning)):
         return [], index
-    edges = np.flatnonzero(np.diff(between.take(index))) + 1
+    edges = np.flatnonzero(np.diff(cell.between.take(index))) + 1
     nodes = np.zeros((len(plan.variables), index.size), dtype=np.int64)
     beyond = np.zeros((1 + machine.directions, cell.members.size))
     for start, stop in itertools.pairwise((0, *edges.tolist(), index.size)):

@@ -10,6 +10,7 @@ in the middle of a cell, is not plain, and is left to the general way.
 from __future__ import annotations
 
 from collections.abc import Collection
+from functools import cached_property
 
 import numpy as np
 from msgspec import Struct
@@ -18,7 +19,7 @@ from potto.core.terms import Term, children
 from potto.integrate.columns import distinct
 from potto.integrate.fixed.lowered_topologies import Found, lowered_topologies
 from potto.integrate.fixed.moving_sums import evaluated
-from potto.integrate.fixed.straight import CLEAR, RowNumbers, Straight, nothing
+from potto.integrate.fixed.straight import CLEAR, ROW_BITS, RowNumbers, Straight, nothing
 from potto.integrate.fixed.topology_text import FARTHEST
 from potto.integrate.pieces import Evaluator, gather
 from potto.kernels.cells import Array, Bools, Cell, Ints, Number, Value
@@ -28,7 +29,7 @@ FEW = 16  # numbers, up to which comparing with each of them takes less time tha
 Turning = tuple[tuple[bool, bool], ...]
 
 
-class Alike(Struct, frozen=True):
+class Alike(Struct, frozen=True, dict=True):
     """Cells of one integrand.
 
     turning: per variable whether the ends of their stretches are like square roots. rows: (variables, 2, N), the rows
@@ -39,6 +40,16 @@ class Alike(Struct, frozen=True):
     turning: Turning
     rows: RowNumbers
     members: Ints
+
+    @cached_property
+    def between(self) -> RowNumbers:
+        """A number for the rows between which a cell lies, (N,). In its order neighbours lie between the same cuts,
+        which numpy then takes whole."""
+        digits = self.rows.reshape(-1, self.members.size)
+        number = np.zeros(self.members.size, dtype=np.int64)
+        for row in digits:
+            number = (number << ROW_BITS) | row
+        return number.astype(np.uint16) if len(digits) * ROW_BITS <= 16 else number  # sorts in one pass
 
 
 class _Cells(Struct):

@@ -108,17 +108,25 @@ def missing(term: Integral, sums: Sums, settings: Settings, env: dict[str, Value
     whole = together(env, sums.v)
     if whole is sums.v and _each(sums.v, sums.e, settings.rtol) and _each(sums.t, sums.et, settings.rtol):
         return out  # as mostly, whatever else would do
-    gross = None if sums.gross is None else together(env, sums.gross)
-    sums = replace(sums, v=whole, gross=gross)
-    within = allowance(term, sums, settings.rtol)
-    for number, error in ((sums.v, sums.e), (sums.t, sums.et)):
+    within: Array | None = None
+    for number, error in ((whole, sums.e), (sums.t, sums.et)):
         size = np.abs(number)
-        speck = SPECK * np.max(size, axis=-1, keepdims=True, initial=0.0, where=np.isfinite(size))
-        fine = error <= np.maximum(np.maximum(settings.atol, settings.rtol * size), np.maximum(within, speck))
-        if number is sums.t:
-            fine |= added_up(env, number, error, settings.rtol)
+        fine = error <= np.maximum(settings.atol, settings.rtol * size)
         fine &= np.isfinite(error)  # of what may be infinite, and may be anything, nothing is known yet
-        out |= ~fine.reshape(-1, out.size).all(axis=0)
+        rest = np.flatnonzero(~fine.reshape(-1, out.size).all(axis=0))
+        if not rest.size:
+            continue
+        if within is None:
+            gross = None if sums.gross is None else together(env, sums.gross)
+            all_of_it = allowance(term, replace(sums, v=whole, gross=gross), settings.rtol)
+            within = np.broadcast_to(all_of_it, out.shape)
+        speck = SPECK * np.max(size, axis=-1, keepdims=True, initial=0.0, where=np.isfinite(size))
+        few = error.take(rest, -1)
+        known = fine.take(rest, -1) | (few <= np.maximum(within.take(rest), speck))
+        if number is sums.t:
+            known |= added_up(env, number, error, settings.rtol).take(rest, -1)
+        known &= np.isfinite(few)
+        out[rest] |= ~known.reshape(-1, rest.size).all(axis=0)
     return out
 
 

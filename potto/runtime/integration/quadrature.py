@@ -62,29 +62,26 @@ def cut_up(plan: Plan, machine: Machine, env: dict[str, Value], batch: int, turn
     turned: plans with other variables innermost, by which a rule may settle members that it did not, since a surface is
     steep in the one and flat in the other.
     """
-    places: list[Ints] = []
-    parts: list[Sums] = []
+    sums: Sums | None = None
     rest = np.arange(batch)
     for own in chain((plan,), turned):
         if own is not plan and rest.size <= FEW_TURNED:
             break
         with one_thread():
-            found = _alike(own, machine, gather(env, rest) if parts else env, rest.size)
+            found = _alike(own, machine, env if sums is None else gather(env, rest), rest.size)
         if found is not None:
-            done, sums = found
-            places.append(rest[done])
-            parts.append(sums.pick(done))
+            done, more = found
+            sums = more if sums is None else sums.with_members(rest[done], more.pick(done))
             rest = rest[~done]
         if not rest.size:
             break
-    if not parts:
+    if sums is None:
         return iterated(plan, machine, env, batch)
     if rest.size:
         apart = machine.apart()
-        parts.append(iterated(plan, apart, gather(env, rest), rest.size))
-        places.append(rest)
+        sums = sums.with_members(rest, iterated(plan, apart, gather(env, rest), rest.size))
         machine.events.take(apart.events, rest)
-    return Sums.joined(parts).pick(np.argsort(np.concatenate(places)))
+    return sums
 
 
 def _alike(plan: Plan, machine: Machine, env: dict[str, Value], batch: int) -> tuple[Bools, Sums] | None:
