@@ -12,6 +12,7 @@ from fractions import Fraction
 from potto.calculus.algebra.rational_form import normal
 from potto.calculus.explanation.brackets import constant
 from potto.calculus.explanation.factors import Factors, factored, written
+from potto.core.polynomials import size_of
 from potto.core.terms import ZERO, Branch, If, Prim, Term, add, children, mul, neg, prim, rebuild, sub, transform
 
 Cost = Callable[[Term], float]
@@ -44,9 +45,9 @@ def _apart(node: If | Branch, tangents: frozenset[str]) -> Term:
     one, other = factored(node.then), factored(node.orelse)
     shared = Factors(Fraction(1), {}, [], [c for c in one.conditions if c in other.conditions])
     for base, n in one.powers.items():
-        m = other.powers.get(base, Fraction(0))
+        m = other.powers.get(base, 0)
         if n * m > 0:
-            shared.times(base, min(n, m, key=abs))
+            shared.times(base, min(n, m, key=size_of))
     shared.exponents = [e for e in one.exponents if e in other.exponents]
     if not (shared.powers or shared.exponents or shared.conditions):
         return node
@@ -56,7 +57,7 @@ def _apart(node: If | Branch, tangents: frozenset[str]) -> Term:
         shared.coefficient = Fraction(-1)
     sides = [written(_without(side, shared), tangents) for side in (one, other)]
     choice = sides[0] if sides[0] == sides[1] else _choosing(node, *sides)
-    shared.times(choice, Fraction(1))
+    shared.times(choice, 1)
     return written(shared, tangents)
 
 
@@ -84,7 +85,7 @@ def _of_size(node: Branch, tangents: frozenset[str], inside: frozenset[str]) -> 
         return None
     if _is_zero(sub(then, orelse)):
         return then
-    vanishes = factored(then).powers.get(size, Fraction(0)) > 0
+    vanishes = factored(then).powers.get(size, 0) > 0
     if vanishes and surface.free.isdisjoint(inside) and _is_zero(add(then, orelse)):
         return written(factored(mul(prim("sign", surface), then)), tangents)
     return None

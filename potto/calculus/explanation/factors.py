@@ -13,7 +13,7 @@ from msgspec import Struct
 
 from potto.calculus.algebra.ranges import range_of
 from potto.calculus.explanation.brackets import NEVER, Inequality, bracket, conditions, constant, fewer, sign_where
-from potto.core.polynomials import number
+from potto.core.polynomials import Exact, number, over
 from potto.core.printer import format_term
 from potto.core.terms import (
     ONE,
@@ -47,14 +47,14 @@ class Factors(Struct):
     """coefficient * the product of base^exponent * exp(the sum of `exponents`), where all conditions hold."""
 
     coefficient: Fraction = Fraction(1)
-    powers: dict[Term, Fraction] = {}
+    powers: dict[Term, Exact] = {}
     exponents: list[Term] = []
     conditions: list[Inequality] = []
 
-    def times(self, base: Term, exponent: Fraction) -> None:
+    def times(self, base: Term, exponent: Exact) -> None:
         """One more factor."""
         if exponent:
-            self.powers[base] = self.powers.get(base, Fraction(0)) + exponent
+            self.powers[base] = self.powers.get(base, 0) + exponent
             if not self.powers[base]:
                 del self.powers[base]
 
@@ -62,11 +62,11 @@ class Factors(Struct):
 def factored(term: Term) -> Factors:
     """The factors of a term; one that is no product is its own."""
     found = Factors()
-    _collect(term, Fraction(1), found)
+    _collect(term, 1, found)
     return found
 
 
-def _collect(term: Term, exponent: Fraction, into: Factors) -> None:
+def _collect(term: Term, exponent: Exact, into: Factors) -> None:
     match term:
         case Const(name=None, value=value) if math.isfinite(value) and value and exponent.denominator == 1:
             into.coefficient *= Fraction(_short(value)) ** int(exponent)
@@ -88,7 +88,7 @@ def _collect(term: Term, exponent: Fraction, into: Factors) -> None:
         ):
             into.times(base, exponent * part)
         case Prim(op="sqrt", args=(inner,)) if exponent.denominator == 1:
-            _collect(inner, exponent / 2, into)
+            _collect(inner, over(exponent, 2), into)
         case Prim(op="add", args=args) if exponent.denominator == 1 and all(map(_negative, args)):
             into.coefficient *= Fraction(-1) ** int(exponent)
             into.times(add(*map(neg, args)), exponent)
@@ -96,7 +96,7 @@ def _collect(term: Term, exponent: Fraction, into: Factors) -> None:
             into.coefficient *= Fraction(found[1]) ** int(exponent)
             into.times(found[0], 2 * exponent)
         case Prim(op="exp", args=(inner,)):
-            into.exponents.append(inner if exponent == 1 else mul(_number(exponent), inner))
+            into.exponents.append(inner if exponent == 1 else mul(_number(Fraction(exponent)), inner))
         case _:
             known = conditions(term) if exponent > 0 else None
             if known is not None:
@@ -139,7 +139,7 @@ def _signed(found: Factors, sign: Prim) -> None:
     """sign(v) v is abs(v), the square of a sign is 1, and so is a sign that the conditions tell."""
     (inner,) = sign.args
     odd = found.powers.pop(sign).numerator % 2
-    own = found.powers.get(inner, Fraction(0))
+    own = found.powers.get(inner, 0)
     if not odd:
         return
     match inner:
@@ -153,10 +153,10 @@ def _signed(found: Factors, sign: Prim) -> None:
         found.conditions = told[1]
         return
     if not own or own.denominator != 1:
-        found.powers[sign] = Fraction(1)
+        found.powers[sign] = 1
         return
-    found.times(inner, Fraction(-1 if own > 0 else 1))
-    found.times(prim("abs", inner), Fraction(1 if own > 0 else -1))
+    found.times(inner, -1 if own > 0 else 1)
+    found.times(prim("abs", inner), 1 if own > 0 else -1)
 
 
 # Writing
@@ -169,14 +169,15 @@ def written(found: Factors, tangents: frozenset[str]) -> Term:
     found = _tidied(found)
     if NEVER in found.conditions:
         return ZERO
-    top = sorted((b for b, n in found.powers.items() if n > 0), key=lambda b: (_place(b, tangents), _order(b)))
+    place = {base: (_place(base, tangents), _order(base)) for base, n in found.powers.items() if n > 0}
+    top = sorted(place, key=place.__getitem__)
     below = sorted((b for b, n in found.powers.items() if n < 0), key=_order)
     scale, divisor = _scale(abs(found.coefficient), bool(below))
     exponent = [prim("exp", add(*found.exponents))] if found.exponents else []
-    plain = [b for b in top if _place(b, tangents) == _PLAIN]
-    names = [b for b in plain if _order(b)[0] == 0 and found.powers[b].denominator == 1]
+    plain = [b for b in top if place[b][0] == _PLAIN]
+    names = [b for b in plain if place[b][1][0] == 0 and found.powers[b].denominator == 1]
     above = [*_powers(found, names, 1), *exponent, *_powers(found, [b for b in plain if b not in names], 1)]
-    tail = [_raised(b, found.powers[b]) for b in top if _place(b, tangents) != _PLAIN]
+    tail = [_raised(b, found.powers[b]) for b in top if place[b][0] != _PLAIN]
     held = [bracket(found.conditions)] if found.conditions else []
     deltas = [b for b in tail if _place(b, tangents) == _DELTA]
     moving = [b for b in tail if b not in deltas]
@@ -199,12 +200,14 @@ def _powers(found: Factors, bases: Iterable[Term], sign: int) -> list[Term]:
     return [*out, prim("sqrt", mul(*roots))] if roots else out
 
 
-def _raised(base: Term, exponent: Fraction) -> Term:
+def _raised(base: Term, exponent: Exact) -> Term:
+    if exponent == 1:
+        return base
     if exponent == _HALF:
         return prim("sqrt", base)
     if exponent.denominator == 2:
         return mul(*([_raised(base, exponent - _HALF)] if exponent > _HALF else []), prim("sqrt", base))
-    return base if exponent == 1 else pow_(base, number(exponent) or const(float(exponent)))
+    return pow_(base, number(exponent) or const(float(exponent)))
 
 
 def _place(base: Term, tangents: frozenset[str]) -> int:

@@ -66,10 +66,11 @@ _SUM = "sum'"  # the name of a sum while it is not taken apart: one that nobody 
 
 class ReadableParts(Struct):
     """Of formulas that are written one after the other. known: what was found for a part of one, by all that this
-    depends on; pause: called before each new part, may raise what ends it."""
+    depends on; factors: of atoms; pause: called before each new part, may raise what ends it."""
 
     pause: Callable[[], None] = lambda: None
     known: dict[tuple[Term, frozenset[str], frozenset[str]], Term] = {}
+    factors: dict[Term, Factors] = {}
 
 
 def readable(
@@ -237,7 +238,8 @@ class _Work:
                 found = normal(form)
                 if found is not None and len(found.top) <= _SUMMANDS:
                     forms += [self._put_back(each, named) for each in self._expanded(found)]
-        return min(forms, key=self._cost)
+        forms = list(dict.fromkeys(forms))
+        return forms[0] if len(forms) == 1 else min(forms, key=self._cost)
 
     def _of_squares(self, node: Prim) -> list[Term]:
         """sqrt(r^2 - (x - a)^2) for sqrt((r - a + x)*(r + a - x))."""
@@ -293,13 +295,21 @@ class _Work:
         found = Factors(coefficient, {}, [], [])
         for monomial, sign in monomials:
             for base, n in monomial:
-                part = factored(base)
+                part = self._factored(base)
                 for inner, power in part.powers.items():
                     found.times(inner, power * n * sign)
-                found.coefficient *= part.coefficient ** (n * sign)
+                if part.coefficient != 1:
+                    found.coefficient *= part.coefficient ** (n * sign)
                 found.exponents += [mul(const(float(n * sign)), e) for e in part.exponents]
                 found.conditions += part.conditions
         return written(found, self.tangents)
+
+    def _factored(self, base: Term) -> Factors:
+        """Its factors, not to be changed: an atom stands in many summands."""
+        known = self.progress.factors
+        if base not in known:
+            known[base] = factored(base)
+        return known[base]
 
     def _expanded(self, found: Rational) -> list[Term]:
         """Written out, around what all summands share and around each tangent."""
@@ -309,8 +319,7 @@ class _Work:
         rest = {without(m, shared): c for m, c in found.top.items()}
         scale = _content(rest)
         rest = {m: Fraction(c / scale) for m, c in rest.items()}
-        below = self._sum(found.below)
-        under = ((below, 1),) if found.below != {(): Fraction(1)} else ()
+        under = ((self._sum(found.below), 1),) if found.below != {(): 1} else ()
         inner = self._around_tangents(rest)
         common = tuple(shared.items())
         whole = self._product(scale, (common, 1), *([(((inner, 1),), 1)]), (under, -1))
@@ -359,7 +368,7 @@ class _Work:
         found = Factors(first.coefficient, dict(first.powers), list(first.exponents), kept)
         positive, turned = (one[0].surface, 1) if not _is_negative(one[0].surface) else (other[0].surface, -1)
         found.coefficient *= turned
-        found.times(prim("sign", positive), Fraction(1))
+        found.times(prim("sign", positive), 1)
         return written(factored(written(found, self.tangents)), self.tangents)
 
 
