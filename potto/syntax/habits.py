@@ -40,7 +40,9 @@ ARRAYS = ("Array", "List", "Vec", "Vector", "array", "list", "vector", "ndarray"
 ARRAY_TYPE = "the type of an array starts with its size: `[n] Real`"
 
 _SEVERAL = re.compile(r"\s*\([^()]*\)\s*in\b")
-_OF_ARRAY = re.compile(r"\s*\(\s*([^\W\d]\w*)\s*\)")
+_ARRAY = re.compile(r"(?P<name>(?:[^\W\d][\w.]*)?)(\s*[([].*)?", re.DOTALL)
+_GENERATOR = re.compile(r"(.+?)\s+for\s+([^\W\d]\w*)\s+in\s+(.+)", re.DOTALL)
+_RANGE = re.compile(r"([^\W\d]\w*)\s+in\s+(.+)", re.DOTALL)
 
 
 def foreign_statement(tokens: list[Token]) -> Diagnostic | None:
@@ -155,18 +157,44 @@ def _bounds(stop: Stop) -> Diagnostic | None:
 
 
 def _sum(stop: Stop) -> Diagnostic | None:
-    """`sum(i in 1..3) …`, `sum(i^2 for i in 1..3)`, `sum(i, 1, 3, i^2)`."""
+    """`sum(i in 1..3) …`, `sum(i^2 for i in 1..3)`, `sum(i, 1, 3, i^2)`, `sum([1, 2])`, `sum [1, 2]`."""
     opening = stop.after if stop.at.kind == "SUM" else stop.at
     word = stop.at if stop.at.kind == "SUM" else stop.before
-    if opening is None or opening.kind != "LPAR" or word is None or word.kind != "SUM":
+    if opening is None or opening.kind not in ("LPAR", "LSQB") or word is None or word.kind != "SUM":
         return None
     if hint := loop_hint(stop):
-        several = hint == SEVERAL and stop.at.kind == "SUM"
+        several = stop.at.kind == "SUM"
         return kinds.UNEXPECTED(opening.span, "what goes through an array has one name", help=hint) if several else None
     message = "the variable of a `sum` stands without parentheses, its terms stand in them"
-    whole = _OF_ARRAY.match(stop.text, opening.start)
-    help = "write `sum i in 1..n (body)`" if whole is None else f"write `sum x in {whole[1]} (x)`"
+    if opening.kind == "LSQB":
+        message = "the elements of an array have a name in a `sum`"
+    help = _instead_of(stop.text[opening.start :]) or "write `sum i in 1..n (body)`"
     return kinds.UNEXPECTED(opening.span, message, help=help)
+
+
+def _instead_of(written: str) -> str:
+    """The sum that is meant by what stands behind its word, in parentheses or as a list; empty if that is not known."""
+    whole = _in_brackets(written)
+    inside = whole[1:-1].strip() if whole[:1] == "(" else whole
+    if found := _GENERATOR.fullmatch(inside):
+        return f"write `sum {found[2]} in {found[3]} ({found[1]})`"
+    if found := _RANGE.fullmatch(inside):
+        return f"write `sum {found[1]} in {found[2]} (body)`"
+    found = _ARRAY.fullmatch(inside)
+    if not inside or found is None or found["name"] == "sum":
+        return ""
+    brackets = inside[found.end("name") :].strip()
+    return f"write `sum x in {inside} (x)`" if _in_brackets(brackets) == brackets else ""
+
+
+def _in_brackets(text: str) -> str:
+    """A text up to where the brackets that are open in it are closed; empty if they are not."""
+    depth = 0
+    for place, sign in enumerate(text):
+        depth += (sign in "([") - (sign in ")]")
+        if depth == 0 and sign in ")]":
+            return text[: place + 1]
+    return ""
 
 
 def _array(stop: Stop) -> Diagnostic | None:
@@ -199,14 +227,13 @@ SEVERAL = "give its parts one name together: `sum p in ps (p.0*p.1)`"
 
 
 def loop_hint(stop: Stop) -> str:
-    """What to write for a loop over tuples by the names of their parts, or for `sum(xs)`."""
+    """What to write for a loop over tuples by the names of their parts."""
     at, rest = stop.at, stop.text[stop.at.end :]
     if (at.kind in ("SUM", "FOR") and _SEVERAL.match(rest)) or (
         at.kind == "IN" and stop.before is not None and stop.before.kind == "RPAR"
     ):
         return SEVERAL
-    whole = _OF_ARRAY.match(rest) if at.kind == "SUM" else None
-    return f"write `sum x in {whole[1]} (x)`" if whole is not None else ""
+    return ""
 
 
 def tuple_without_parentheses(stop: Stop) -> Diagnostic | None:

@@ -6,6 +6,7 @@ import pytest
 from syntax_help import check_messages, everything, messages
 
 from potto.syntax import split
+from potto.syntax.parser import parse_chunk
 
 
 def test_python() -> None:
@@ -84,6 +85,26 @@ def test_mathematics() -> None:
         def f(x) x – 1
         #          ^ error[P0112]: Potto does not know the character `–`
     """)
+
+
+@pytest.mark.parametrize(
+    ("written", "instead"),
+    [
+        ("sum(xs)", "sum x in xs (x)"),
+        ("sum([1, 2])", "sum x in [1, 2] (x)"),
+        ("sum [1, 2]", "sum x in [1, 2] (x)"),
+        ("sum(people.height)/2", "sum x in people.height (x)"),
+        ("sum(f(a, b))", "sum x in f(a, b) (x)"),
+        ("sum(a^2 for a in xs)", "sum a in xs (a^2)"),
+        ("sum(i in 1..3) (i)", "sum i in 1..3 (body)"),
+        ("sum(i, 1, 3)", "sum i in 1..n (body)"),
+        ("sum()", "sum i in 1..n (body)"),
+    ],
+)
+def test_what_is_summed_in_other_languages_is_said_here(written: str, instead: str) -> None:
+    for before in ("", "2*", "let a = 1 in "):
+        helps = [d.help for d in parse_chunk(f"def f(xs) {before}{written}").diagnostics if d.code == "P0103"]
+        assert helps[0] == f"write `{instead}`"
 
 
 def test_a_line_that_is_indented_more_goes_on() -> None:

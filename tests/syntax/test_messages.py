@@ -120,7 +120,7 @@ def test_unfinished() -> None:
         ("from .m import a", "P0118", ".", "a module's name does not begin with a dot"),
         ("from ..m import a", "P0118", "..", "a module's name does not begin with a dot"),
         ("import a, b", "P0118", ",", "one `import` takes one module"),
-        ("x = sum(y)", "P0103", "sum", "unexpected `sum`"),
+        ("x = sum(y)", "P0103", "(", "the variable of a `sum` stands without parentheses, its terms stand in them"),
         ("x = 1 if p else 2", "P0103", "if", "unexpected `if`"),
         ("def", "P0115", "def", "expected a name after `def`"),
         ("f(x) = x^2", "P0119", "f(x)", "a function with parameters is defined with `def`"),
