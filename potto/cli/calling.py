@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import re
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -11,6 +12,8 @@ if TYPE_CHECKING:
     from potto.evaluating.given import Given
     from potto.evaluating.world import World
     from potto.python.functions import Function
+
+_IN_PROGRAMS = re.compile(r"\w+(\.\w+|\[[^][]*\])*")
 
 
 def assignment(text: str) -> tuple[str, str]:
@@ -30,6 +33,10 @@ def from_file(text: str) -> str:
         rest, colon, column = column.partition(":")
         path = f"{path}:{rest}"
     whole = f'load("{os.path.abspath(path)}")'
+    if colon and not _IN_PROGRAMS.fullmatch(column):  # as the file has it: `height (cm)`
+        from potto.data.texts import identifiers
+
+        column = identifiers([column])[0]
     return f"({whole}).{column}" if colon else _only(whole, path)
 
 

@@ -15,7 +15,8 @@ from potto.data.mistakes import malformed
 
 _WIDE = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 # What may stand in a name: superscripts are letters to `\w`, but exponents to a program.
-_ODD = re.compile(r"[\W²³¹⁰⁴-⁹]")
+_ODD = re.compile(r"[\W²³¹⁰⁴-⁹]+")
+_AROUND = re.compile(r"^\W+|\W+$")
 _UTF8 = "save it again as UTF-8 text"
 
 
@@ -37,8 +38,8 @@ def text_of(content: bytes) -> str:
 
 
 def identifiers(names: Sequence[str]) -> list[str]:
-    """Names as programs can write them, all different: `max. speed` is `max__speed`, `2nd` is `_2nd`, a second `x` is
-    `x_2`. One that is left out is told by its number, as `column_3`."""
+    """Names as programs can write them, all different: `speed (m/s)` is `speed_m_s`, `2nd` is `_2nd`, a second `x`
+    is `x_2`. One that is left out is told by its number, as `column_3`."""
     clean = [_identifier(name) or f"column_{number}" for number, name in enumerate(names, 1)]
     taken, found = set(clean), dict[str, None]()
     for name in clean:
@@ -50,5 +51,5 @@ def identifiers(names: Sequence[str]) -> list[str]:
 
 
 def _identifier(name: str) -> str:
-    plain = _ODD.sub("_", unicodedata.normalize("NFC", name.strip()))
+    plain = _ODD.sub("_", _AROUND.sub("", unicodedata.normalize("NFC", name)))
     return f"_{plain}" if plain[:1].isdigit() or plain.startswith("λ") else plain

@@ -50,6 +50,16 @@ def test_who_uses_a_name_gets_its_value(
     assert Path(program).read_text() == PROGRAM
 
 
+def test_a_column_is_called_as_the_file_does_or_as_programs_do(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("people.csv").write_text('# measured\nname,"height (cm)"\n"Ann, B",170\n"Cy ""x""",180\n')
+    for column in ("height (cm)", "height_cm"):
+        said = answered(capsys, "eval", "sum x in xs (x)", "--set", f"xs=@people.csv:{column}")
+        assert said.strip() == "350"
+
+
 def test_names_without_a_file(capsys: pytest.CaptureFixture[str]) -> None:
     assert answered(capsys, "eval", "f(2) + k", "--set", "f=\\x . k*x", "--set", "k=3").strip() == "9"
 

@@ -85,7 +85,7 @@ def test_any_bytes_are_answered(content: bytes) -> None:
         ('"first name" b\n1 2\n', {"first_name": [1.0], "b": [2.0]}),
         ('"a\nb",c\n# no\n1,2\n', {"a_b": [1.0], "c": [2.0]}),
         ("total weight\n1\n2\n", {"total_weight": [1.0, 2.0]}),
-        ("time (s; UTC),x\n1,2\n3,4", {"time__s__UTC_": [1.0, 3.0], "x": [2.0, 4.0]}),
+        ("time (s; UTC),x\n1,2\n3,4", {"time_s_UTC": [1.0, 3.0], "x": [2.0, 4.0]}),
         ("year,2019,2020\n1,2,3", {"year": [1.0], "_2019": [2.0], "_2020": [3.0]}),
         (",a\n0,5\n1,6", {"column_1": [0.0, 1.0], "a": [5.0, 6.0]}),
         ("x,y,\n1,2,\n3,4,\n", {"x": [1.0, 3.0], "y": [2.0, 4.0]}),  # a comma at the end of each line
@@ -102,7 +102,7 @@ def test_layouts(text: str, expected: object) -> None:
 
 
 def test_only_tabs_separate_in_tsv() -> None:
-    assert plain("t.tsv", "a, b\n1\n2") == {"a__b": [1.0, 2.0]}
+    assert plain("t.tsv", "a, b\n1\n2") == {"a_b": [1.0, 2.0]}
 
 
 def said(text: str, name: str = "t.csv") -> tuple[str, int | None, int | None, str, str]:
@@ -183,7 +183,7 @@ def test_a_hundred_thousand_rows_take_less_than_a_second() -> None:
 
 
 def test_comments_within_quotes_are_none() -> None:
-    assert separated('"a\n# b"\n1', tabs=False).fields[0][0] == "a___b"  # type: ignore[union-attr]
+    assert separated('"a\n# b"\n1', tabs=False).fields[0][0] == "a_b"  # type: ignore[union-attr]
 
 
 @given(boxes, st.integers(0, 5), st.lists(st.sampled_from(TEXTS), min_size=1), st.sampled_from(",;\t|"), st.booleans())
