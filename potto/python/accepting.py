@@ -37,9 +37,13 @@ def accepted(argument: Any, type: Type | None) -> Any:
         found = values if isinstance(values, ArrayOf) else found
     if found is None and isinstance(argument, tuple):  # of a whole group
         return tuple(accepted(item, None) for item in argument)
-    columns = _columns_of(argument) if record_in(found) is not None else None
-    if columns is not None:
-        return columns
+    record = found.record if isinstance(found, TupleOf) else record_in(found)
+    columns = None if record is None else _columns_of(argument)
+    if columns is not None and record is not None:  # of which a table may have more
+        known = {name: columns[name] for name in record.fields if name in columns}
+        argument = known if len(known) == len(record.fields) else columns
+        if not isinstance(found, TupleOf):
+            return argument
     if isinstance(found, ArrayOf) and hasattr(argument, "to_numpy"):
         return argument  # with its labels, by which a gap is told
     if not isinstance(argument, PLAIN):

@@ -37,7 +37,9 @@ def with_arrays(name: str, argument: Any, type: Type, sizes: Sizes) -> Any:
     if isinstance(found, TupleOf) and found.record is not None and not isinstance(argument, tuple):
         argument = _fields(name, argument, found.record)
     if isinstance(found, TupleOf) and isinstance(argument, tuple) and len(argument) == len(found.items):
-        return tuple(with_arrays(name, part, item, sizes) for part, item in zip(argument, found.items, strict=True))
+        fields = range(len(argument)) if found.record is None else found.record.fields
+        each = zip(fields, argument, found.items, strict=True)
+        return tuple(with_arrays(f"{name}.{own}", part, item, sizes) for own, part, item in each)
     return argument
 
 

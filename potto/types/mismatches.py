@@ -93,7 +93,7 @@ def mismatch(
         help = "write it for each element, `[… for x in xs]`, or take one, `xs[i]`"
     elif is_whole_dual(actual, expected):
         help = BY_PARTS
-    elif isinstance(resolve(expected), ArrayOf):
+    elif isinstance(resolve(expected), ArrayOf | TupleOf):
         help = _columns(resolve(actual), resolve(expected), expr)
     message = f"{what} must be `{wanted}`, but this is `{shown}`"
     return kind(expr.span, message, label=f"this is `{shown}`", related=related, help=help)
@@ -114,10 +114,12 @@ def is_whole_dual(actual: Type, expected: Type) -> bool:
 
 
 def _columns(actual: Type, expected: Type, expr: nodes.Expr) -> str:
-    """What to write where a table stands for one of its columns, or for its rows; of columns that are no fields, and
-    the reverse, which."""
+    """What to write where a table stands for one of its columns, or for its rows, or a record for another one; of
+    columns that are no fields, and the reverse, which."""
     if not isinstance(actual, TupleOf) or actual.record is None or not isinstance(expr, nodes.Name | nodes.Member):
         return ""
+    if isinstance(expected, TupleOf):
+        return _field_by_field(actual.record, expected.record, print_expression(expr))
     item = resolve(expected.item) if isinstance(expected, ArrayOf) else expected
     if isinstance(item, TupleOf) and item.record is not None and _is_table(actual):
         missing = [f"`{field}`" for field in item.record.fields if field not in actual.record.fields]
@@ -127,6 +129,13 @@ def _columns(actual: Type, expected: Type, expr: nodes.Expr) -> str:
         return f"it has no column {', '.join(missing)}, which `{item.record.name}` needs; its columns are {others}"
     arrays = [f"`{print_expression(expr)}.{name}`" for name in array_fields(actual)[:3]]
     return f"take one of its columns: {', '.join(arrays)}" if arrays else ""
+
+
+def _field_by_field(given: RecordName, wanted: RecordName | None, name: str) -> str:
+    """A record made of the fields of another one, if that has them all."""
+    if wanted is None or not set(wanted.fields) <= set(given.fields):
+        return ""
+    return f"write `{wanted.name}({', '.join(f'{field}={name}.{field}' for field in wanted.fields)})`"
 
 
 def _is_table(type: TupleOf) -> bool:

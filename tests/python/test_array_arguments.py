@@ -394,10 +394,10 @@ def test_a_table_is_taken_by_its_names() -> None:
             return np.array(self.items)
 
     class Table:
-        columns = ("r", "x")
+        columns = ("r", "x", "more")
 
         def __init__(self) -> None:
-            self.held = {"r": [2.0, 4.0], "x": [1.0, 3.0]}
+            self.held = {"r": [2.0, 4.0], "x": [1.0, 3.0], "more": [0.0, 0.0]}
 
         def __getitem__(self, name: str) -> Column:
             return Column(self.held[name])
@@ -407,6 +407,8 @@ def test_a_table_is_taken_by_its_names() -> None:
 
     module = potto.compile(DISCS)
     assert module.flat(Table(), 0.5).value == 50
+    of_columns = potto.compile("record Columns(x: [n] Real, r: [n] Real)\ndef f(c: Columns) c.x[0]*c.r[1]")
+    assert of_columns.f(Table()).value == 4 and potto.grad(of_columns.f)(Table()).tangent.r.tolist() == [0, 1]
     assert (module.k.value, module.k.tangent) == (5, 2)
 
 

@@ -35,6 +35,12 @@ def test_a_size_in_a_record():
     assert format_type(interface(db, MAIN, "f").type) == "(m: Mesh, k: Mesh) -> Real"
 
 
+def test_a_record_of_another_name_is_made_of_the_fields_of_the_first():
+    text = "record Vec(x: Real, y: Real)\nrecord Pixel(y: Real, x: Real, grey: Real)\n"
+    text += "def norm2(v: Vec) v.x^2 + v.y^2\ndef f(p: Pixel) norm2(p)"
+    assert only(text).help == "write `Vec(x=p.x, y=p.y)`"
+
+
 def test_mistakes():
     check("""
         record Vec(x: Real, y: Real)
