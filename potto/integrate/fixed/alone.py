@@ -32,6 +32,7 @@ from potto.kernels.native.promotion import Promotion
 from potto.kernels.native.vectors import LANES
 
 MOST_REGIONS = 512
+LEFT = ELSEWHERE * SUMMED
 # Of a parameter: its name, and the direction of a tangent; -1 for the value.
 Read = tuple[str, int]
 
@@ -73,8 +74,7 @@ class Face(Struct, frozen=True):
         rows = np.array([cell.rows for cell in self.cells], dtype=float)[lanes]  # (lanes, variables, 2)
         ends = [np.ascontiguousarray(rows[:, i, side]) for i in range(rows.shape[1]) for side in (0, 1)]
         nobody = np.zeros(lanes.size, dtype=np.int64)  # no parameter differs from cell to cell
-        told = 3 * self.k1 + 3
-        out = np.empty((told + self.k1 * len(self.axes), lanes.size))
+        out = np.empty((self.way.rows(self.k1), lanes.size))
         frame = frame_of(out, self.axes, [nobody, *ends])
         reads = tuple(
             (place.name, -1 if place.part.kind == "v" else place.part.direction)
@@ -83,7 +83,7 @@ class Face(Struct, frozen=True):
         )
         constants = np.empty(len(reads))
         where = address(frame), address(constants)
-        return _Layout(reads, constants, out[:told, :count], frame, [nobody, *ends], where)
+        return _Layout(reads, constants, out[:, :count], frame, [nobody, *ends], where)
 
     def summed(self, function: Loaded, env: Mapping[str, Cell]) -> Totals | None:
         """The sums over all nodes of the cells; None where cuts cross."""
@@ -96,10 +96,14 @@ class Face(Struct, frozen=True):
         if not min(rows[3 * self.k1]) > 0:
             return None
         k1, share = self.k1, ELSEWHERE if self.nodes > TRACKED else 1.0
-        sums = list(map(sum, rows))
-        gross = [max(sums[k1 + d], sum(map(abs, rows[d]))) for d in range(k1)]
-        error = [share * sums[2 * k1 + d] + ELSEWHERE * SUMMED * gross[d] for d in range(k1)]
-        return Totals(sums[:k1], error, gross, self.nodes)
+        number, error, gross = [], [], []
+        for d in range(k1):
+            own = rows[d]
+            most = max(sum(rows[k1 + d]), sum(map(abs, own)))
+            number.append(sum(own))
+            error.append(share * sum(rows[2 * k1 + d]) + LEFT * most)
+            gross.append(most)
+        return Totals(number, error, gross, self.nodes)
 
 
 def summed_alone(
@@ -172,4 +176,4 @@ def _face(plan: Straight, region: Region, machine: Evaluator, env: Mapping[str, 
     every = max(orders), *region.inner
     nodes = len(cells) * math.prod(every)
     axes = tuple(axis(order, MEAN, (False, False), nodes > TRACKED) for order in every)
-    return Face(lowered_cells(plan, body, machine.directions, env), cells, axes, 1 + machine.directions, nodes)
+    return Face(lowered_cells(plan, body, machine.directions, env, False), cells, axes, 1 + machine.directions, nodes)

@@ -69,7 +69,8 @@ class Raw(Struct, frozen=True):
     number: (1 + k, M), the integrals. coefficients: per variable (1 + k, M, rows), the sizes of the coefficients asked
     for along it, integrated over the others. most, off: (1 + k, M), what is added up, and what rounding puts it off, by
     the nodes at which that is followed. clear: (M,) whether no cut comes between, and nothing near by is singular.
-    corners, largest: (M,) the largest value at the ends of stretches, and at nodes.
+    corners, largest: (M,) the largest value at the ends of stretches, and at nodes. Of a rule that is known to do
+    nothing is told: no coefficients, and None for these.
     """
 
     number: Array
@@ -77,5 +78,5 @@ class Raw(Struct, frozen=True):
     most: Array
     off: Array
     clear: Bools
-    corners: Array
-    largest: Array
+    corners: Array | None = None
+    largest: Array | None = None

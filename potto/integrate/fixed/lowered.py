@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from potto.core.terms import Term, postorder
 from potto.integrate.fixed.axes import Axis, Raw
 from potto.integrate.fixed.formula_text import ONE, Place
+from potto.integrate.fixed.mean_text import MeanText
 from potto.integrate.fixed.rule_text import NAME, RuleText
 from potto.integrate.fixed.straight import RowNumbers, Straight
 from potto.integrate.pieces import Evaluator
@@ -37,18 +38,21 @@ LINES, LINES_OF_A_TERM = 400, 3
 
 
 class LoweredCells(Struct, frozen=True):
-    """The rule for cells of one integrand with any number of nodes, for parameters with these parts."""
+    """The rule for cells of one integrand with any number of nodes, for parameters with these parts.
+
+    told: whether coefficients tell what it leaves out; else that is known.
+    """
 
     plan: Straight
     face: Term
     places: tuple[Place, ...]
+    told: bool
     promotion: Promotion
 
     def function(self, machine: Evaluator) -> Loaded | None:
         """The function, if it is to be used now."""
-        return self.promotion.function(
-            machine.backend, lambda: RuleText(self.plan, self.face, machine).text(self.places)
-        )
+        kind = RuleText if self.told else MeanText
+        return self.promotion.function(machine.backend, lambda: kind(self.plan, self.face, machine).text(self.places))
 
     def run(
         self, function: Loaded, env: Mapping[str, Value], members: Ints, rows: RowNumbers, axes: Sequence[Axis],
@@ -58,7 +62,7 @@ class LoweredCells(Struct, frozen=True):
         k1, count = 1 + directions, members.size
         numbers, arrays = given(self.places, env)
         ends = [row.astype(float) for pair in rows for row in pair]
-        sizes = [3 * k1 + 3, *(axis.transform.shape[1] * k1 for axis in axes)]
+        sizes = [self.rows(k1), *(axis.transform.shape[1] * k1 for axis in axes if self.told)]
         out = np.empty((sum(sizes), max(count, LANES)))
         columns = [whole(column, out.shape[1]) for column in (members, *ends)]
         columns[1:1] = map(np.ascontiguousarray, arrays)
@@ -66,20 +70,27 @@ class LoweredCells(Struct, frozen=True):
         function.call(address(frame), address(numbers))
         counts.native_points += count * math.prod(len(axis.nodes) for axis in axes)
         found = out[:, :count]
-        number, most, off, rest = np.split(found[: sizes[0]], [k1, 2 * k1, 3 * k1])
+        number, most, off, clear = found[:k1], found[k1 : 2 * k1], found[2 * k1 : 3 * k1], found[3 * k1] > 0
+        if not self.told:
+            return Raw(number, [], most, off, clear)
+        corners, largest = found[3 * k1 + 1 : sizes[0]]
         parts = np.split(found[sizes[0] :], np.cumsum(sizes[1:])[:-1])
         coefficients = [part.reshape(-1, k1, count).transpose(1, 2, 0) for part in parts]
-        return Raw(number, coefficients, most, off, rest[0] > 0, rest[1], rest[2])
+        return Raw(number, coefficients, most, off, clear, corners, largest)
+
+    def rows(self, k1: int) -> int:
+        """How many rows of results there are before those of coefficients."""
+        return 3 * k1 + (3 if self.told else 1)
 
 
-def lowered_cells(plan: Straight, face: Term, directions: int, env: Mapping[str, Value]) -> LoweredCells:
+def lowered_cells(plan: Straight, face: Term, directions: int, env: Mapping[str, Value], told: bool) -> LoweredCells:
     """The rule for an integrand on cells, in an environment whose numbers have these parts."""
     places = places_of(plan.names, env)
-    key = (face, directions, places)
+    key = (face, directions, places, told)
     found: LoweredCells | None = plan.lowered.get(key)
     if found is None:
         lines = LINES + LINES_OF_A_TERM * terms_of(plan, face) * (1 + directions)
-        found = plan.lowered[key] = LoweredCells(plan, face, places, Promotion(NAME, lines))
+        found = plan.lowered[key] = LoweredCells(plan, face, places, told, Promotion(NAME, lines))
     return found
 
 

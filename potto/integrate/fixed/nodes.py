@@ -57,11 +57,12 @@ def at_once(
         every = cells.at_nodes(machine, [axis.nodes for axis in axes], False)
     number, coefficients = cells.added(every)
     off, most = cells.rounded(some)
-    corners = every
-    if any(axis.transform.shape[1] > 1 for axis in axes):
-        corners = cells.at_nodes(tracking, [np.array([0.0, 1.0])] * len(axes), False)
+    clear = every.clear & some.clear
+    if all(axis.transform.shape[1] == 1 for axis in axes):
+        return Raw(number, [], most, off, clear)
+    corners = cells.at_nodes(tracking, [np.array([0.0, 1.0])] * len(axes), False)
     largest = [_largest(nodes.value[:1]) for nodes in (corners, every)]
-    return Raw(number, coefficients, most, off, every.clear & some.clear, *largest)
+    return Raw(number, coefficients, most, off, clear, *largest)
 
 
 class _Cells(Struct, frozen=True):

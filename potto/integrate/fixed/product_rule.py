@@ -64,7 +64,7 @@ class Rule(Struct, frozen=True):
         return math.prod(self.orders)
 
     def lowered(self, env: dict[str, Value]) -> LoweredCells:
-        return lowered_cells(self.plan, self.cell.face, self.machine.directions, env)
+        return lowered_cells(self.plan, self.cell.face, self.machine.directions, env, not all(self.exact))
 
     def native(self, env: dict[str, Value]) -> bool:
         """Whether this is for machine code now."""
@@ -110,10 +110,12 @@ class Rule(Struct, frozen=True):
     def _measured(self, raw: Raw, index: Ints, orders: tuple[int, ...]) -> Measured:
         """What the first coefficients tell, as many as these orders have."""
         truncated = np.zeros(raw.number.shape) if self.beyond is None else self.beyond.take(index, 1)
-        for most, order, exact, sizes in zip(self.orders, orders, self.exact, raw.coefficients, strict=True):
-            if not exact:
-                truncated += analytic_truncation(sizes[..., : sizes.shape[-1] - most + order], order)
-        clear = raw.clear if all(self.exact) else raw.clear & ~(raw.corners > PEAK * raw.largest)
+        clear = raw.clear
+        if raw.corners is not None and raw.largest is not None:
+            for most, order, exact, sizes in zip(self.orders, orders, self.exact, raw.coefficients, strict=True):
+                if not exact:
+                    truncated += analytic_truncation(sizes[..., : sizes.shape[-1] - most + order], order)
+            clear = clear & ~(raw.corners > PEAK * raw.largest)
         truncated[:, ~clear] = np.inf
         gross = np.maximum(raw.most, np.abs(raw.number))
         rounding = (ELSEWHERE if self._several(index) else 1.0) * raw.off + ELSEWHERE * SUMMED * gross

@@ -44,28 +44,40 @@ class RuleText(FormulaText):
         at, k1 = self.at, self.k1
         self.begin()
         self.added = [at.room(at.whole("mul", table[1], k1)) for table in self.tables]
-        clear, corners, largest = at.room(1), at.room(1), at.room(1)
-        self.clear = clear
-        start = self.columns
-        members = at.wholes(at.at(at.address("%frame", start, "ptr"), self.first, "i64"))
-        here, rows = self.parameters(places, start + 1, 2 * len(self.plan.variables), members)
-        self.rows = list(zip(rows[::2], rows[1::2], strict=True))
-        at.store(self.one, clear)
+        corners, largest = at.room(1), at.room(1)
+        here = self.cells(places)
         at.store(self.zero, corners)
         at.store(self.zero, largest)
         for i, table in enumerate(self.tables):
             self.fill(self.added[i], table[1], k1)
         number = self.every(0, here, [self.one, *[None] * (k1 - 1)], largest)
+        sizes, off = self.rounded(here)
+        self.ends(0, {name: still(symbol) for name, symbol in here.items()}, corners)
+        self.told([*number, *sizes, *off, at.load(self.clear), at.load(corners), at.load(largest)], k1)
+        return self.end()
+
+    def cells(self, places: Sequence[Place]) -> Env:
+        """The parameters of the cells of a block, which are clear so far; between which rows they lie is noted."""
+        at, start = self.at, self.columns
+        self.clear = at.room(1)
+        members = at.wholes(at.at(at.address("%frame", start, "ptr"), self.first, "i64"))
+        here, rows = self.parameters(places, start + 1, 2 * len(self.plan.variables), members)
+        self.rows = list(zip(rows[::2], rows[1::2], strict=True))
+        at.store(self.one, self.clear)
+        return here
+
+    def rounded(self, here: Env) -> tuple[Dual, Dual]:
+        """The most that is added up over the cells, and what rounding puts it off; that none comes to the edge of where
+        a builtin is analytic is noted."""
+        at = self.at
         bounds = [(at.room(1), at.room(1)) for _ in self.edges]
         for least, most in bounds:
             at.store(at.number(np.inf), least)
             at.store(self.zero, most)
-        sizes, off = self.few(0, here, bounds)
+        found = self.few(0, here, bounds)
         for least, most in bounds:
             self.only(at.apply("gt", at.load(least), at.apply("mul", at.number(EDGE), at.load(most))))
-        self.ends(0, {name: still(symbol) for name, symbol in here.items()}, corners)
-        self.told([*number, *sizes, *off, at.load(clear), at.load(corners), at.load(largest)], k1)
-        return self.end()
+        return found
 
     # Columns of numbers
 

@@ -92,12 +92,14 @@ class Vectors:
         self.depths.update(dict.fromkeys(names, self.depth))
         return j, names
 
-    def end(self, *sums: str) -> None:
-        """End the innermost loop. sums: what those that it adds up are after a round, and so behind it."""
+    def end(self, *sums: str | None) -> None:
+        """End the innermost loop. sums: what those that it adds up are after a round, and so behind it; None for one
+        that is not used."""
         stem, count, only = self.loops.pop()
         body = self.bodies.pop()
         self.known.pop()
-        for name in sums:
+        used = [(i, name) for i, name in enumerate(sums) if name is not None]
+        for _, name in used:
             self.depths[name] = self.depth
         self.bodies[-1] += [
             f"  br label %before{stem}", f"before{stem}:",
@@ -105,7 +107,7 @@ class Vectors:
             f"loop{stem}:",
             f"  %j{stem} = phi i64 [0, %before{stem}], [%next{stem}, %last{stem}]",
             *(f"  %c{stem}.{i} = phi {NUMBER} [zeroinitializer, %before{stem}], [{name}, %last{stem}]"
-              for i, name in enumerate(sums)),
+              for i, name in used),
             *body, f"  br label %last{stem}", f"last{stem}:", f"  %next{stem} = add i64 %j{stem}, 1",
             f"  %more{stem} = icmp ult i64 %next{stem}, {count}",
             f"  br i1 %more{stem}, label %loop{stem}, label %after{stem}", f"after{stem}:",
