@@ -73,6 +73,20 @@ def test_proofs_for_regions_of_parameters_ask_for_few_nodes() -> None:
             assert abs(answer.tangent[d][i] - exact) <= answer.tangent_error[d][i]
 
 
+@pytest.mark.parametrize("count", [20, 100])
+def test_few_members_get_the_nodes_that_are_proved_for_many(count: int) -> None:
+    """Coefficients would have a member of a hundred take 350 nodes; 14 x 12 in each of one or two cells are enough."""
+    shade = "1/(sqrt(2)*(x + y + c) + 2)^2"
+    c = np.linspace(-1.99, -0.01, count)
+    answer = answered(f"def f(c) integral ([0, 1], [0, 1]) {shade} * [x + y + c >= 0] d(x, y)", c)
+    assert answer.converged and answer.evals <= 260 * count
+    for i in (0, count // 3, count - 1):
+        at = mp.mpf(float(c[i]))
+        corners = sorted({-at, max(-at, mp.mpf(1)), mp.mpf(2)})
+        exact = mp.quad(lambda s, at=at: min(s, 2 - s) / (mp.sqrt(2) * (s + at) + 2) ** 2, corners)
+        assert abs(answer.value[i] - exact) <= answer.error[i] <= 1e-14
+
+
 @pytest.mark.parametrize("order", ["x, y", "y, x"])
 def test_circles_turn_at_both_ends(order: str) -> None:
     r = np.linspace(0.2, 0.95, 100)

@@ -11,6 +11,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from msgspec import Struct
@@ -23,36 +24,31 @@ from potto.integrate.fixed.topologies import Alike
 from potto.integrate.pieces import Evaluator
 from potto.integrate.rules.proved_orders import Cell as Stretch
 from potto.integrate.rules.proved_orders import proved_of_each
-from potto.kernels.cells import Array, Bools, Cell, Ints, Number, Value
+from potto.kernels.cells import Array, Cell, Ints, Number, Value
 from potto.kernels.making import making
 
 # How many cells in a region pay for its proof, which takes 0.1 ms where many are proved at once, and into how many
-# parts, as a power of two, the range of parameters is cut at the most.
-LEAST, FINEST = 32, 5
+# parts, as a power of two, the range of parameters is cut at the most. Where one parameter differs there are no more
+# regions than these, whatever batches come, so that they are proved for FEW cells between the same rows.
+LEAST, FEW, FINEST = 32, 8, 5
 # The least radius of a region, as a part of the size of a parameter: the bound of a derivative is that of the error by
 # the radius.
 NARROWEST = 2.0**-6
 # Nodes per variable are multiples of this: rules that differ in a node take longer to be called than they save.
 EVEN = 2
 # A call of a rule takes as long as so many nodes.
-CALL = 1 << 16
+CALL = 1 << 17
 
 
 class _Grid(Struct, frozen=True):
-    """Regions of parameters: the width of each along a parameter, and the radii of the discs of the proofs."""
+    """Regions of parameters: the width of each along a parameter, and the radii of the discs of the proofs. least: how
+    many cells between the same rows are worth their proofs."""
 
+    least: int
     names: tuple[str, ...]
     width: tuple[float, ...]
     radius: tuple[float, ...]
     narrowest: float
-
-
-class _Proved(Struct, frozen=True):
-    """Per cell (M,): the nodes of each variable, (D, M), 0 where nothing was proved; bounds of what a rule leaves out
-    of the values and tangents (1 + k, M)."""
-
-    nodes: Ints
-    beyond: Array
 
 
 def proved_rules(
@@ -63,26 +59,70 @@ def proved_rules(
     exact: the nodes of variables in which the integrand is a polynomial.
     """
     index = np.argsort(cell.between, kind="stable")
-    if index.size < 2 * LEAST or any(map(any, cell.turning)):
+    if index.size < FEW or any(map(any, cell.turning)):
         return [], index
-    edges = np.flatnonzero(np.diff(cell.between.take(index))) + 1
-    nodes = np.zeros((len(plan.variables), index.size), dtype=np.int64)
+    edges = (np.flatnonzero(np.diff(cell.between.take(index))) + 1).tolist()
+    groups = [(start, stop, _stretch(cell, int(index[start])))
+              for start, stop in itertools.pairwise((0, *edges, index.size))]  # fmt: skip
+    members = cell.members.take(index)
+    values = {name: _of(env[name].v, members) for name in _names(plan, groups)}  # type: ignore[union-attr]
+    grid = _grid(values, index.size)
+    if grid is None:
+        return [], index
+    code, places = _regions(values, grid, index.size)
+    tolerance = MARGIN * min(machine.rtol, LOOSEST) * (grid.narrowest if machine.directions else 1.0)
+    nodes, error = np.zeros((len(plan.variables), index.size), dtype=np.int64), np.zeros(index.size)
+    for start, stop, stretch in groups:
+        if stop - start < grid.least:
+            continue
+        own = code[start:stop]
+        those = distinct(own)
+        orders, errors = _orders(plan, stretch, exact, grid, places.take(those, 1), tolerance)
+        at = np.searchsorted(those, own)
+        nodes[:, start:stop], error[start:stop] = orders.take(at, 1), errors.take(at)
     beyond = np.zeros((1 + machine.directions, cell.members.size))
-    for start, stop in itertools.pairwise((0, *edges.tolist(), index.size)):
-        those = index[start:stop]
-        found = _proved(plan, exact, machine, env, cell, those) if those.size >= 2 * LEAST else None
-        if found is not None:
-            nodes[:, start:stop] = found.nodes
-            beyond[:, those] = found.beyond
+    beyond[0, index] = error
+    for d in range(machine.directions):
+        beyond[1 + d, index] = error * _speed(grid, env, members, d)
     exactly = (True,) * len(plan.variables)
     parts = _shared(nodes)
     rules = [(Rule(plan, cell, orders, exactly, machine, beyond), index[own]) for orders, own in parts.items()]
     return rules, index[nodes[0] == 0]
 
 
-def _shared(nodes: Ints) -> dict[tuple[int, ...], Bools]:
-    """By orders, of which there are few, the cells that get as many nodes: at least those that are asked for (D, M)."""
-    base = int(nodes.max(initial=0)) + 1
+def _stretch(cell: Alike, number: int) -> Stretch:
+    """What one of the cells is to a proof."""
+    rows = cell.rows[:, :, number].tolist()
+    return Stretch(tuple((low, high) for low, high in rows), cell.face)
+
+
+def _names(plan: Straight, groups: Sequence[tuple[int, int, Stretch]]) -> list[str]:
+    """The parameters of some cells."""
+    stretches = [stretch for _, _, stretch in groups]
+    ends = {plan.items[i][row] for stretch in stretches for i, pair in enumerate(stretch.rows) for row in pair}
+    terms = {*ends, *(stretch.body for stretch in stretches)}
+    return sorted({name for term in terms for name in term.free}.difference(plan.variables))
+
+
+def _speed(grid: _Grid, env: dict[str, Value], members: Ints, direction: int) -> Number:
+    """By how much the bound of a derivative along a direction is larger than that of the value."""
+    speed: Number = 0.0
+    for name, radius in zip(grid.names, grid.radius, strict=True):
+        given = env[name]
+        assert isinstance(given, Cell)
+        t = given.t[direction] if direction < len(given.t) else None
+        if t is not None:
+            speed = np.maximum(speed, np.abs(_of(t, members)) / radius)
+    return speed
+
+
+def _shared(nodes: Ints) -> dict[tuple[int, ...], Any]:
+    """By orders, of which there are few, an index of the cells that get as many nodes: at least those that are asked
+    for (D, M)."""
+    most = tuple(nodes.max(axis=1).tolist())
+    if nodes[0].all() and math.prod(most) * nodes.shape[1] - int(nodes.prod(axis=0).sum()) < CALL:
+        return {most: slice(None)}
+    base = max(most) + 1
     kind = np.zeros(nodes.shape[1], dtype=np.int64)
     for row in nodes:
         kind = kind * base + row
@@ -92,52 +132,24 @@ def _shared(nodes: Ints) -> dict[tuple[int, ...], Bools]:
         if number and count
     }
     parts = {orders: [orders] for orders in counts}
-    for orders in sorted(counts, key=counts.__getitem__):
-        if orders not in parts:  # others have joined these
-            continue
+    settled: dict[tuple[int, ...], list[tuple[int, ...]]] = {}
+    while counts:
+        orders = min(counts, key=counts.__getitem__)
         count, own = counts.pop(orders), parts.pop(orders)
-        into, least = orders, CALL
+        joint, least = None, CALL
         for other, those in counts.items():
-            both = math.prod(map(max, orders, other))
-            more = (both - math.prod(orders)) * count + (both - math.prod(other)) * those
+            both = tuple(map(max, orders, other))
+            more = (math.prod(both) - math.prod(orders)) * count + (math.prod(both) - math.prod(other)) * those
             if more < least:
-                into, least = other, more
-        joint = tuple(map(max, orders, into))
+                joint, into, least = both, other, more
+        if joint is None:
+            settled[orders] = own
+            continue
         for key in {into, joint} & parts.keys():
             count, own = count + counts.pop(key), own + parts.pop(key)
         counts[joint], parts[joint] = count, own
     place = base ** np.arange(len(nodes))[::-1]
-    return {orders: np.isin(kind, np.array(own) @ place) for orders, own in parts.items()}
-
-
-def _proved(
-    plan: Straight, exact: Sequence[int | None], machine: Evaluator, env: dict[str, Value], cell: Alike, those: Ints
-) -> _Proved | None:
-    """What is known of cells between the same rows; None if there is no telling regions."""
-    rows = cell.rows[:, :, those[0]]
-    stretch = Stretch(tuple((int(low), int(high)) for low, high in rows), cell.face)
-    ends = (plan.items[i][row] for i, pair in enumerate(stretch.rows) for row in pair)
-    names = sorted(cell.face.free.union(*(end.free for end in ends)).difference(plan.variables))
-    members = cell.members.take(those)
-    values = {name: _of(env[name].v, members) for name in names}  # type: ignore[union-attr]
-    grid = _grid(values, those.size)
-    if grid is None:
-        return None
-    code, places = _regions(values, grid)
-    tolerance = MARGIN * min(machine.rtol, LOOSEST) * (grid.narrowest if machine.directions else 1.0)
-    nodes, error = _orders(plan, stretch, exact, grid, places, tolerance)
-    beyond = np.empty((1 + machine.directions, those.size))
-    beyond[0] = error.take(code)
-    for d in range(machine.directions):
-        speed: Number = 0.0
-        for name, radius in zip(grid.names, grid.radius, strict=True):
-            given = env[name]
-            assert isinstance(given, Cell)
-            t = given.t[d] if d < len(given.t) else None
-            if t is not None:
-                speed = np.maximum(speed, np.abs(_of(t, members)) / radius)
-        beyond[1 + d] = beyond[0] * speed
-    return _Proved(nodes.take(code, 1), beyond)
+    return {orders: np.isin(kind, np.array(own) @ place) for orders, own in settled.items()}
 
 
 def _of(number: Number, members: Ints) -> Number:
@@ -149,7 +161,7 @@ def _grid(values: dict[str, Number], count: int) -> _Grid | None:
     other batches are the same."""
     ends = {name: (float(np.min(x)), float(np.max(x))) for name, x in values.items()}
     moving = sum(high > low for low, high in ends.values())
-    fine = min(FINEST, int(math.log2(count / LEAST))) // max(moving, 1)
+    fine = FINEST if moving < 2 else min(FINEST, int(math.log2(max(count / LEAST, 1)))) // moving
     widths, radii, narrowest = [], [], 1.0
     for low, high in ends.values():
         size = max(abs(low), abs(high))
@@ -160,10 +172,10 @@ def _grid(values: dict[str, Number], count: int) -> _Grid | None:
         widths.append(width)
         radii.append(max(0.5 * width, narrow))
         narrowest = min(narrowest, radii[-1] / (size or 1.0))
-    return _Grid(tuple(ends), tuple(widths), tuple(radii), narrowest)
+    return _Grid(FEW if moving < 2 else 2 * LEAST, tuple(ends), tuple(widths), tuple(radii), narrowest)
 
 
-def _regions(values: dict[str, Number], grid: _Grid) -> tuple[Ints, Ints]:
+def _regions(values: dict[str, Number], grid: _Grid, cells: int) -> tuple[Ints, Ints]:
     """In which of some regions each cell's parameters lie (M,), and the places of these in the grid (P, R)."""
     code, sizes = np.zeros(1, dtype=np.int64), []
     for x, width in zip(values.values(), grid.width, strict=True):
@@ -178,7 +190,7 @@ def _regions(values: dict[str, Number], grid: _Grid) -> tuple[Ints, Ints]:
     for least, count in reversed(sizes):
         places.append(rest % count + least)
         rest = rest // count
-    number = np.searchsorted(known, code)
+    number = np.broadcast_to(np.searchsorted(known, code), cells)
     return number, np.array(places[::-1], dtype=np.int64).reshape(len(sizes), known.size)
 
 

@@ -53,6 +53,9 @@ class Whole:
 
     @property
     def sums(self) -> Sums:
+        if len(self.parts) == 1:  # all of them, in order
+            (_, part), *_ = self.parts
+            return replace(part, gross=added_up(part))
         order = np.argsort(np.concatenate([index for index, _ in self.parts]))
         return Sums.joined([replace(part, gross=added_up(part)) for _, part in self.parts]).pick(order)
 
@@ -169,7 +172,7 @@ def _together(problem: Problem, todo: Ints, settled: Settled, found: Whole) -> l
                     part.events.take(here.events.of(group, TwoSided, Fold), np.arange(group.size))
                     own = settled(part, order, sums.pick(group))
                     rough = missing(problem.term, own, problem.machine.settings, part.env)
-                    spoilt = rough & rounded(own)
+                    spoilt = rough & rounded(own) if rough.any() else rough
                     if spoilt.sum() > FEW_MEMBERS:
                         by_cuts(part, order, own, spoilt)
                         rough &= ~spoilt

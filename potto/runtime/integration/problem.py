@@ -23,6 +23,7 @@ from potto.calculus.inlining.deciding import deciding
 from potto.core.packing import keep, keeping, recall
 from potto.core.terms import Deriv, Integral, Lam, Term, Var, deriv, substitute, var
 from potto.diagnostics import PottoError
+from potto.integrate.columns import run_of
 from potto.integrate.elimination.recursion import Eliminated, eliminated
 from potto.integrate.events import Events
 from potto.integrate.pieces import Sums, still
@@ -157,6 +158,8 @@ class Problem:
 
     def picked(self, index: Ints) -> Problem:
         """The problem of some members; one of them by itself has plain numbers."""
+        if 1 < index.size == self.batch and run_of(index) is not None:  # all
+            return self.changed()
 
         def part(a: Array) -> Any:
             return float(a[index[0]]) if index.size == 1 else a[index]
