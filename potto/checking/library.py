@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Sequence
+from functools import lru_cache
 
 from potto.checking.check import diagnostics, errors_of
 from potto.checking.spoiled import standing_in_the_way
@@ -25,6 +26,7 @@ from potto.syntax import nodes
 NOWHERE = Span(0, 0)
 NO_PROGRAMS = declare("P0230", "a folder without programs")
 NO_SUCH_DEFINITION = declare("P0232", "a name on the command line that the file does not define")
+_absolute = lru_cache(maxsize=1024)(os.path.isabs)  # every call asks for the settings of its file
 
 
 class Library:
@@ -56,7 +58,7 @@ class Library:
 
     def project(self, file: str) -> Project | None:
         """The project of a file, or of the folder that a pseudo file stands for: the first root's."""
-        if not os.path.isabs(file):
+        if not _absolute(file):
             file = next(iter(self.files.roots), "")
         return self.projects.of(file)
 

@@ -10,7 +10,6 @@ import math
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Literal, get_args
 
 from msgspec import Struct
@@ -68,15 +67,30 @@ class Settings(Struct, frozen=True):
         return self.rtol
 
 
+class _Changes(Struct, frozen=True):
+    """What is set in a block; `made`: the settings that come of it, by the last ones that they change."""
+
+    values: Mapping[str, object]
+    made: list[tuple[Settings, Settings]] = []
+
+    def of(self, base: Settings) -> Settings:
+        for before, found in self.made:
+            if before is base:
+                return found
+        found = replace(base, **self.values)
+        self.made[:] = [(base, found)]
+        return found
+
+
 DEFAULTS = Settings()
-_changes: ContextVar[Mapping[str, object]] = ContextVar("potto_settings", default=MappingProxyType({}))
+_changes: ContextVar[_Changes | None] = ContextVar("potto_settings", default=None)
 _executor: ContextVar[Executor | None] = ContextVar("potto_executor", default=None)
 
 
 def current(base: Settings = DEFAULTS) -> Settings:
     """The settings in force in this thread or task; `base` counts where nothing is set, as a project says it."""
     changes = _changes.get()
-    return replace(base, **changes) if changes else base
+    return base if changes is None else changes.of(base)
 
 
 def executor() -> Executor | None:
@@ -123,7 +137,8 @@ def settings(**changes: object) -> Iterator[Settings]:
         if complaint is not None:
             raise PottoError([BAD_SETTING(Span(0, 0), complaint)])
     numbers = {name: value for name, value in changes.items() if name != "executor"}
-    token = _changes.set({**_changes.get(), **numbers})
+    before = _changes.get()
+    token = _changes.set(_Changes(numbers if before is None else {**before.values, **numbers}))
     helpers = _executor.set(changes.get("executor", _executor.get()))  # type: ignore[arg-type]  # `problem` looked
     try:
         yield current()

@@ -1,8 +1,9 @@
 """Calls with numbers near those of before: from arguments to the answer with nothing in between but its rule.
 
-Owns `AtOnce` and `at_once`. Where a call is nothing but an integral, or arithmetic with some, and all about them is
-settled in the region where its numbers lie (`integrate/fixed/a_priori.Settled`), the general way has nothing left to
-find out. What it told once about such a call, it would tell again.
+Owns `AtOnce` and `at_once`, and for batches `Together` and `together`. Where a call is nothing but an integral, or
+arithmetic with some, and all about them is settled in the region where its numbers lie
+(`integrate/fixed/a_priori.Settled`), the general way has nothing left to find out. What it told once about such a call,
+it would tell again. A batch of numbers goes from its arrays to the integral.
 """
 
 from __future__ import annotations
@@ -11,21 +12,24 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Literal
 
+import numpy as np
 from msgspec import Struct
 from msgspec.structs import asdict, replace
 
 from potto.core.terms import Lam
+from potto.diagnostics import PottoError
 from potto.integrate.costs import wanted
 from potto.kernels.cells import Cell, Value
 from potto.projects.settings import Settings
-from potto.python.arguments import LARGEST, with_axes, without_axes
+from potto.python.arguments import LARGEST, Batch, with_axes, without_axes
+from potto.python.tiles import LEAST
 from potto.runtime.answers.estimate import Estimate
-from potto.runtime.evaluate import Clock, Program, stats_of
+from potto.runtime.evaluate import Clock, Program, bar, number, report, stats_of
 from potto.runtime.evaluation.duals import merge
 from potto.runtime.evaluation.functions import Closure
 from potto.runtime.evaluation.machine import WATCHING, Machine
 from potto.runtime.evaluation.record import Record, watched
-from potto.runtime.integration.direct import Direct, SettledAround, SettledCall
+from potto.runtime.integration.direct import Batches, Direct, SettledAround, SettledCall
 
 # What is not the same when the same is asked again.
 TIMES = {"seconds", "compile_seconds", "plan_seconds", "stats"}
@@ -62,21 +66,42 @@ class Read(Struct, frozen=True, eq=False):
         return Cell(arg, None, self.t, self.et)
 
 
-class AtOnce(Struct, frozen=True, eq=False):
-    """What a call, or its gradient, takes for numbers in a region."""
+class Kept(Struct, frozen=True, eq=False):
+    """What is known of a call, or of its gradient: how its numbers are asked for, what its arguments are like, and how
+    its estimate is made."""
 
     settings: Settings
-    settled: SettledCall | SettledAround
     reads: tuple[Read, ...]
-    stats: Mapping[str, Any]
     made: Callable[..., Estimate]
     wrt: tuple[str, ...]
     dual: bool
 
+    def asked(self, args: tuple[Any, ...], settings: Settings) -> bool:
+        """Whether such a call is asked for, and no more than its answer."""
+        same = settings is self.settings or settings == self.settings
+        return same and len(args) == len(self.reads) and not _looked_at()
+
+    def estimate(self, number: Sequence[Any], error: Sequence[Any], **told: Any) -> Estimate:
+        """The estimate of a value and its tangents."""
+        if self.dual or self.wrt:
+            one = self.dual or len(self.wrt) == 1
+            tangent, off = (number[1], error[1]) if one else (tuple(number[1:]), tuple(error[1:]))
+            told |= {"tangent": tangent, "tangent_error": off}
+        if self.wrt and not self.dual:
+            told["wrt"] = self.wrt
+        return self.made(number[0], error[0], method="quadrature", **told)
+
+
+class AtOnce(Kept, frozen=True, eq=False):
+    """What a call takes for numbers in a region."""
+
+    settled: SettledCall | SettledAround
+    stats: Mapping[str, Any]
+
     def answer(self, args: tuple[Any, ...], settings: Settings) -> Estimate | None:
         """The estimate; None where only the general way has it. Arrays of one member cost what numbers cost."""
         start = time.perf_counter()
-        if len(args) != len(self.reads) or settings != self.settings or _looked_at():
+        if not self.asked(args, settings):
             return None
         env, axes = self._env(args), 0
         if env is None:
@@ -94,17 +119,8 @@ class AtOnce(Struct, frozen=True, eq=False):
         every: Any = None
         if axes:
             number, error, every = with_axes(number, axes), with_axes(error, axes), with_axes((True,), axes)[0]
-        more: dict[str, Any] = {}
-        if self.dual or self.wrt:
-            one = self.dual or len(self.wrt) == 1
-            tangent, off = (number[1], error[1]) if one else (tuple(number[1:]), tuple(error[1:]))
-            more = {"tangent": tangent, "tangent_error": off}
-        if self.wrt and not self.dual:
-            more["wrt"] = self.wrt
-        return self.made(
-            number[0], error[0], evals=found.nodes, seconds=time.perf_counter() - start, method="quadrature",
-            stats=dict(self.stats), member_converged=every, **more,
-        )  # fmt: skip
+        return self.estimate(number, error, evals=found.nodes, seconds=time.perf_counter() - start,
+                             stats=dict(self.stats), member_converged=every)  # fmt: skip
 
     def _env(self, args: tuple[Any, ...]) -> dict[str, Cell] | None:
         """The numbers as the integral takes them; None where one is of another kind than those of before."""
@@ -118,6 +134,88 @@ class AtOnce(Struct, frozen=True, eq=False):
                 return None
             env[read.name] = value
         return env
+
+
+class Together(Kept, frozen=True, eq=False):
+    """What a call takes for a batch of numbers."""
+
+    batches: Batches
+
+    def answer(self, args: tuple[Any, ...], settings: Settings) -> Estimate | None:
+        """As of `AtOnce`, for arrays that make a batch of several members that is not done in tiles."""
+        arrays = [arg for arg in args if arg.__class__ is np.ndarray]
+        if not arrays or not self.asked(args, settings):
+            return None
+        try:
+            batch = Batch(np.broadcast_shapes(*(array.shape for array in arrays)))
+        except ValueError:
+            return None
+        env = self._env(args, batch) if 1 < batch.size < LEAST else None
+        if env is None:
+            return None
+        try:
+            with Clock() as clock:
+                value, machine = self.batches.at(env)
+        except (PottoError, RecursionError):  # the general way says what is wrong, and where
+            return None
+        return self._told(value, machine, clock, batch) if isinstance(value, Cell) else None
+
+    def _told(self, cell: Cell, machine: Machine, clock: Clock, batch: Batch) -> Estimate:
+        """The estimate of an integral; whether it is what was asked for needs no thought where each number is."""
+        record, parts = machine.record, list(zip((cell.v, *cell.t), (cell.e, *cell.et), strict=True))
+        plain = not (machine.events or record.edges or record.shortfalls)
+        if plain and all(_precise(x, e, self.settings.rtol) for x, e in parts):
+            numbers, errors = ([np.array(x).reshape(batch.shape) for x in side] for side in zip(*parts, strict=True))
+            return self.estimate(
+                numbers, errors, evals=record.evaluations, seconds=clock.seconds, compile_seconds=clock.spent,
+                plan_seconds=clock.planning, stats=stats_of(record, clock),
+                member_converged=np.ones(batch.shape, dtype=bool),
+            )  # fmt: skip
+        found = report(cell, machine, clock)
+        if not self.wrt:
+            return batch.shaped(found)
+        tangents = tuple(number(x) for x, _ in parts[1:]), tuple(number(bar(e)) for _, e in parts[1:])
+        tangent, off = (side[0] if len(self.wrt) == 1 else side for side in tangents)
+        found = replace(found, tangent=tangent, tangent_error=off)
+        return self.made(**asdict(batch.shaped(found)), wrt=self.wrt)
+
+    def _env(self, args: tuple[Any, ...], batch: Batch) -> dict[str, Value] | None:
+        env: dict[str, Value] = {}
+        for read, arg in zip(self.reads, args, strict=True):
+            if arg.__class__ is np.ndarray and arg.ndim:
+                if read.kind != "number" or arg.dtype.kind not in "fiu":
+                    return None
+                env[read.name] = Cell(batch.flat(arg.astype(np.float64)), None, read.t, read.et)
+                continue
+            value = read.of(arg)
+            if value is None:
+                return None
+            env[read.name] = value
+        return env
+
+
+def together(
+    program: Program, term: Lam, values: Sequence[Value], machine: Machine, found: Estimate, wrt: tuple[str, ...]
+) -> Together | None:
+    """What a call over a batch takes that has just been answered; as of `at_once`."""
+    direct = program.shortest(term.body)
+    if not isinstance(direct, Direct) or _looked_at():
+        return None
+    reads = [_read(name, None, value, False) for name, value in zip(term.params, values, strict=True)]
+    batches = direct.batches(_clean(machine), dict(zip(term.params, values, strict=True)))
+    if batches is None or None in reads:
+        return None
+    return Together(
+        machine.settings, tuple(read for read in reads if read is not None), type(found), wrt, False, batches
+    )
+
+
+def _precise(numbers: Any, errors: Any, rtol: float) -> bool:
+    """Whether each number is there, finite and known to this part of it."""
+    if numbers is None or errors is None:
+        return False
+    size = np.abs(numbers)
+    return bool((errors <= rtol * size).all() and (size < np.inf).all())
 
 
 def at_once(
@@ -152,7 +250,7 @@ def at_once(
     if totals is None:
         return None
     stats = stats_of(Record(evaluations=totals.nodes, integrals=found.stats["integrals"]), clock)
-    kept = AtOnce(machine.settings, settled, reads, stats, type(found), wrt, dual)
+    kept = AtOnce(machine.settings, reads, type(found), wrt, dual, settled, stats)
     again = kept.answer(args, machine.settings)
     return kept if again is not None and _told(again) == _told(found) else None
 
@@ -163,7 +261,12 @@ def _read(name: str, arg: Any, value: Value, dual: bool) -> Read | None:
         known = getattr(arg, "_value", None)
         return None if known is None else Read(name, "function", part=known())
     moving = merge(value) if dual and not isinstance(value, list) else value
-    if type(moving) is not Cell or moving.v.__class__ is not float or moving.e is not None or any(moving.et):
+    if (
+        type(moving) is not Cell
+        or moving.e is not None
+        or any(moving.et)
+        or any(isinstance(t, np.ndarray) for t in moving.t)
+    ):
         return None
     if isinstance(value, tuple):
         return Read(name, "dual", moving.t, moving.et, arg[1]) if arg.__class__ is tuple else None
@@ -172,7 +275,7 @@ def _read(name: str, arg: Any, value: Value, dual: bool) -> Read | None:
 
 def _clean(machine: Machine) -> Machine:
     """The machine without what a call has left in it."""
-    return machine.apart().changed(record=Record())
+    return machine.apart().changed(record=Record(most_boxes=machine.record.most_boxes))
 
 
 def _looked_at() -> bool:

@@ -17,7 +17,8 @@ from potto.evaluating.world import World
 from potto.kernels.cells import Value
 from potto.projects.settings import current
 from potto.python.arguments import Batch
-from potto.python.at_once import AtOnce, at_once
+from potto.python.at_once import AtOnce, Together, at_once, together
+from potto.python.tiles import LEAST
 from potto.reports.render import Located, ProgramError
 from potto.runtime.answers.estimate import Estimate
 from potto.runtime.answers.shown import as_dual, gives_dual, named_answer
@@ -30,6 +31,7 @@ from potto.types.types import Function as FunctionType
 from potto.types.types import Type
 
 NOWHERE = Span(0, 0)
+BATCHES = "batches"
 Form = tuple[tuple[int, tuple[str, ...]], ...]
 
 
@@ -50,21 +52,33 @@ class Call(Struct, frozen=True, eq=False):
         with Clock() as clock:
             value = self.value(values, machine)
         estimate = report(value, machine, clock)
-        return named_answer(batch.shaped(as_dual(estimate) if self._gives_dual() else estimate), self.result)
+        found = named_answer(batch.shaped(as_dual(estimate) if self._gives_dual() else estimate), self.result)
+        if 1 < batch.size < LEAST:
+            self.keep((), values, found, machine=machine)
+        return found
 
     def at_once(self, args: tuple[Any, ...], wrt: tuple[str, ...] = ()) -> Estimate | None:
-        """The estimate for plain numbers near those of before, with its derivatives by the parameters named; None
-        where it takes more than the rule of one integral."""
-        known: AtOnce | None = self.world.memory.get((self, wrt))
-        return None if known is None else known.answer(args, current(self.world.settings(self.file)))
+        """The estimate for plain numbers near those of before, or for a batch, with its derivatives by the parameters
+        named; None where it takes more than the rule of one integral."""
+        memory = self.world.memory
+        known: AtOnce | None = memory.get((self, wrt))
+        found = None if known is None else known.answer(args, current(self.world.settings(self.file)))
+        many: Together | None = memory.get((self, wrt, BATCHES)) if found is None else None
+        return found if many is None else many.answer(args, current(self.world.settings(self.file)))
 
     def keep(
         self, args: Sequence[Any], values: Sequence[Value], found: Estimate, wrt: tuple[str, ...] = (),
         machine: Machine | None = None,
     ) -> None:  # fmt: skip
-        """Keep what answers such calls at once, if anything does. args: as they were given. machine: for tangents."""
+        """Keep what answers such calls at once, if anything does. args: as they were given. machine: for tangents, and
+        for a batch that which answered."""
         term, program = self.elaborated, self.world.program
         if values and isinstance(term, Lam):
+            if getattr(found.value, "size", 1) > 1:
+                many = None if machine is None else together(program, term, values, machine, found, wrt)
+                if many is not None:
+                    self.world.memory[self, wrt, BATCHES] = many
+                return
             machine = machine or program.machine(current(self.world.settings(self.file)))
             known = at_once(program, term, tuple(args), values, machine, found, wrt)
             if known is not None:

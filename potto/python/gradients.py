@@ -29,6 +29,7 @@ from potto.python.moving import each_moving, moved, own, size, with_own, with_pl
 from potto.python.named_parameters import Names, parameters_to_vary
 from potto.python.remade import remade
 from potto.python.sided import with_sides
+from potto.python.tiles import LEAST
 from potto.runtime.answers.arithmetic import Pair
 from potto.runtime.answers.estimate import Estimate
 from potto.runtime.answers.named import named
@@ -220,7 +221,7 @@ def gradient(call: Call, arguments: Sequence[tuple[str, Value]], wrt: tuple[str,
     run = _Run(call, arguments, batch, {})
     value = run.along_each(wrt)
     found = run.gradient(value, value, wrt)
-    if batch.size == 1:
+    if batch.size < LEAST:
         run.keep(found, wrt)
     return found
 

@@ -154,6 +154,59 @@ def test_calls_near_those_of_before_are_answered_the_same(
     assert sum(answered) >= 25 and not all(answered)
 
 
+@pytest.mark.parametrize("shape", [(2,), (30,), (5, 40)])
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_batches_are_answered_the_same_from_the_second_call_on(
+    backend: str, shape: tuple[int, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Two arrays that broadcast, a number beside one, members beyond all edges, and arrays that are other ones."""
+    module = potto.compile(RENDERER)
+    random = np.random.default_rng(3)
+    calls: list[Callable[[Any], potto.Estimate]] = [
+        lambda c: module.f(c),
+        lambda c: potto.grad(module.f)(c),
+        lambda c: potto.grad(module.two, ("b", "a"))(-c, np.full(shape[-1:], 0.5)),
+        lambda c: potto.grad(module.two, "b")(0.75, -c),
+        lambda c: potto.grad(module.two, ("a", "b"))(np.round(-c), 0.5),  # edges on bounds: notes
+        lambda c: potto.grad(module.two, "b")(-2.0, c),  # nothing but rounding in the derivative
+    ]
+    with potto.settings(backend=backend):
+        for call in calls:
+            for least in (-1.99, -2.5, -1.9):
+                c = random.uniform(least, -0.01, shape)
+                call(c)
+                found = call(c)
+                with monkeypatch.context() as patch:
+                    patch.setattr(Call, "at_once", lambda *_: None)
+                    general = call(c)
+                for ours, theirs in ((found.value, general.value), (found.error, general.error),
+                                     (found.tangent, general.tangent), (found.tangent_error, general.tangent_error),
+                                     (found.member_converged, general.member_converged)):  # fmt: skip
+                    assert np.array_equal(np.asarray(ours), np.asarray(theirs))
+                assert (type(found), found.evals, found.method) == (type(general), general.evals, general.method)
+                assert (found.converged, found.reasons) == (general.converged, general.reasons)
+                assert list(map(str, found.notes)) == list(map(str, general.notes))
+
+
+def test_batches_go_straight_to_the_integral(monkeypatch: pytest.MonkeyPatch) -> None:
+    """And what is to be told of them is told as ever: at t = 1 the edge lies on the bound."""
+    f, answered = potto.grad(potto.compile("def f(t) integral [0, 1] exp(x)*[x < t] d(x)").f), []
+    at_once = Call.at_once
+
+    def spied(self: Call, *given: Any) -> potto.Estimate | None:
+        found = at_once(self, *given)
+        answered.append(found is not None)
+        return found
+
+    monkeypatch.setattr(Call, "at_once", spied)
+    plain, on_bound = np.linspace(0.1, 0.9, 50), np.linspace(0.02, 1.0, 50)
+    for t in (plain, plain, on_bound, on_bound, plain[:7]):
+        found = f(t)
+        assert np.allclose(found.value, np.expm1(t), rtol=1e-14, atol=0)  # closed form, to rounding
+        assert bool(found.notes) == (t is on_bound)
+    assert answered == [True] * 4  # of the first call nothing is known
+
+
 def test_what_is_known_of_calls_is_left_where_more_is_asked() -> None:
     f = potto.compile(RENDERER).f
     for _ in range(3):

@@ -348,10 +348,12 @@ def _truncation(plan: Straight, region: Region, directions: int, env: Mapping[st
 
 def _accurate(found: Totals, truncation: Sequence[float], rtol: float, atol: float) -> Totals | None:
     """The answer, if it is as accurate as was asked for, or as its rounding allows."""
-    errors, unit = [], EPS * max(found.gross)
+    errors, unit, least, part = [], EPS * max(found.gross), 0.5 * atol, 0.5 * rtol
     for x, rounding, gross, beyond in zip(found.number, found.error, found.gross, truncation, strict=True):
-        asked = 0.5 * max(atol, rtol * abs(x))
-        if not (rounding <= asked and beyond <= max(asked, NOISE * gross, unit)):
+        asked = part * abs(x)
+        if asked < least:
+            asked = least
+        if not rounding <= asked or not (beyond <= asked or beyond <= NOISE * gross or beyond <= unit):
             return None
         errors.append(rounding + beyond)
     return Totals(found.number, errors, found.gross, found.nodes)

@@ -26,7 +26,7 @@ ORDERS = (4, 6, 10, 14, 18)
 PILOTS = 64
 BATCH = 4096  # members integrated at once
 FEW_TURNED = 16  # members up to which it does not pay to look for rules along other variables
-FEW = 256  # members for which it does not pay to look for those that nothing cuts
+FEW = 64  # members for which it does not pay to look for those that nothing cuts
 MOST_AXES = 2  # of a product rule for one member: with 4,096 nodes 14 of each of three, which hardly ever are enough
 
 
