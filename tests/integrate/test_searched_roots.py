@@ -19,7 +19,7 @@ from scipy import special
 import potto
 from potto.calculus.solving.enclosable import slope_of
 from potto.core.terms import add, const, mul, prim, sub, var
-from potto.integrate.decomposition.root_isolation import isolated
+from potto.integrate.decomposition.root_isolation import Isolated, isolated
 from potto.integrate.events import BUDGET_SPENT, ROOTS_NOT_SEPARATED
 from potto.integrate.rules.intervals import enclosure
 from potto.kernels.cells import Cell
@@ -159,6 +159,36 @@ def test_roots_between_infinite_bounds_where_terms_of_the_surface_have_no_sum() 
         cells = sorted(zip(found.a[found.owner == i], found.b[found.owner == i], strict=True))
         assert len(cells) == len(roots)
         assert all(a <= root <= b for (a, b), root in zip(cells, roots, strict=True))
+
+
+def test_roots_that_were_found_in_an_evaluation_are_not_searched_again() -> None:
+    """Unless something of what is asked is another number: of x^3 - x = c those in [-2, 2], then in [0, 2]."""
+    x = var("x")
+    surface = sub(prim("pow", x, const(3.0)), add(x, var("c")))
+    slope = slope_of(surface, "x")
+    assert slope is not None
+    known, looked = Isolated(), []
+
+    def roots(c: float, low: float) -> int:
+        looked.clear()
+        within = lambda cells: not looked.append(cells)  # noqa: E731
+        bounds = np.array([low]), np.array([2.0])
+        return int(isolated(surface, slope, "x", {"c": Cell(c)}, *bounds, within=within, known=known).owner.size)
+
+    assert roots(0.225, -2.0) == 3 and looked
+    assert roots(0.225, -2.0) == 3 and not looked
+    assert roots(0.225, 0.0) == 1 and looked
+    assert roots(0.5, -2.0) == 1 and looked
+    assert roots(0.225, 0.0) == 1 and not looked
+
+
+def test_a_search_that_the_budget_has_ended_is_not_taken_for_one_that_was_made() -> None:
+    x, known = var("x"), Isolated()
+    surface, slope = sub(prim("sin", x), var("c")), prim("cos", x)
+    for ended in (True, False):
+        found = isolated(surface, slope, "x", {"c": Cell(0.5)}, np.array([0.0]), np.array([100.0]),
+                         within=lambda cells, ended=ended: not ended, known=known)  # fmt: skip
+        assert found.complete != ended
 
 
 @pytest.mark.parametrize(

@@ -1,13 +1,15 @@
 """Intervals with one root each: of a surface along one variable, for a whole batch at once.
 
-Owns `isolated`, `flat`, `between` and `at_label`. A cell over which the enclosure of the surface leaves out 0 has no
-root; one over which that of its slope does has at most one, and the signs at its ends tell. All others are halved. So
-no root is missed, however narrow what brings it forth; what is given up on, once there are too many cells, is told.
+Owns `isolated`, `Isolated`, `flat`, `between` and `at_label`. A cell over which the enclosure of the surface leaves
+out 0 has no root; one over which that of its slope does has at most one, and the signs at its ends tell. All others are
+halved. So no root is missed, however narrow what brings it forth; what is given up on, once there are too many cells,
+is told.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from hashlib import blake2b
 
 import numpy as np
 from msgspec import Struct
@@ -15,7 +17,7 @@ from msgspec import Struct
 from potto.core.terms import Branch, Proj, Term, Var, children, postorder, rebuild, var
 from potto.integrate.rules.intervals import Interval, everywhere
 from potto.integrate.rules.lowered_intervals import enclosures
-from potto.kernels.cells import Array, Bools, Cell, Ints, Value
+from potto.kernels.cells import Array, Bools, Cell, Ints, Number, Value
 
 FINEST = 48  # halvings of the whole
 FAR = (2.0**100, 2.0**30, 2.0**9)  # where signs are looked at that infinity does not tell
@@ -24,6 +26,7 @@ CELLS, CELLS_EACH = 1 << 16, 1 << 9  # at most so many open at once, or so many 
 # Up to how many widths of its enclosure at a point a surface may vary over a cell that is not looked at more closely:
 # halves of it would say no more. Of x - sin(x) that is settled after 40 cells, and never without.
 SHALLOW = 2.0
+KEPT, LEAST = 1 << 18, 64  # numbers: 2 MB; what one search counts as beside its own
 
 _Stretches = tuple[Ints, Array, Array]  # whose, from where, to where
 
@@ -41,22 +44,54 @@ class Brackets(Struct):
     hidden: _Stretches
 
 
+class Isolated(Struct):
+    """What was found in one evaluation: other orders of the variables, the sides of a kink, differences and second
+    looks ask for the same roots again. numbers: how many are kept."""
+
+    found: dict[tuple[Term, str, bool, bytes], Brackets] = {}
+    numbers: int = 0
+
+    def keep(self, key: tuple[Term, str, bool, bytes], brackets: Brackets) -> None:
+        size = LEAST + sum(part.size for part in (brackets.owner, brackets.a, brackets.b, *brackets.hidden))
+        if brackets.complete and self.numbers + size <= KEPT:
+            self.found[key] = brackets
+            self.numbers += size
+
+
 def isolated(
     surface: Term, slope: Term, variable: str, env: dict[str, Value], low: Array, high: Array, jumps: bool = True,
-    backend: str = "numpy", within: Callable[[int], bool] = lambda cells: True,
+    backend: str = "numpy", within: Callable[[int], bool] = lambda cells: True, known: Isolated | None = None,
 ) -> Brackets:  # fmt: skip
     """The sign changes of a surface between bounds (B,), which may be infinite.
 
     jumps: whether something jumps there, so that what hides roots is left as it is; a kink is wanted to the last digit.
-    within: whether so many more cells are within the budget.
+    within: whether so many more cells are within the budget. known: what was found before in this evaluation.
     """
     (surface, slope), env = flat((surface, slope), env)
     fixed: dict[str, Interval] = {}
-    for name in surface.free - {variable}:
+    for name in sorted(surface.free - {variable}):
         value = env[name]
         assert isinstance(value, Cell)
         fixed[name] = value.v, value.v
-    cells = _Cells(surface, slope, variable, fixed, low, high, backend)
+    if known is None:
+        return _searched(_Cells(surface, slope, variable, fixed, low, high, backend), jumps, within)
+    key = surface, variable, jumps, _digest([low, high, *(value for value, _ in fixed.values())])
+    if key not in known.found:
+        brackets = _searched(_Cells(surface, slope, variable, fixed, low, high, backend), jumps, within)
+        known.keep(key, brackets)
+        return brackets
+    return known.found[key]
+
+
+def _digest(numbers: Sequence[Number]) -> bytes:
+    text = blake2b(digest_size=16)
+    for number in numbers:
+        text.update(np.asarray(number, dtype=float).tobytes() + b"|")
+    return text.digest()
+
+
+def _searched(cells: _Cells, jumps: bool, within: Callable[[int], bool]) -> Brackets:
+    low, high = cells.low, cells.high
     there = np.nonzero(low < high)[0]
     owner, s0, s1 = there, np.zeros(there.size), np.ones(there.size)
     found: list[_Stretches] = []

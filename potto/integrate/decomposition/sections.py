@@ -133,7 +133,7 @@ class _Along(Struct, frozen=True, dict=True):
         else:
             brackets = isolated(
                 self.surface, slope, self.variable, self.env, low, high, self.decides, self.machine.backend,
-                self.machine.isolates,
+                self.machine.isolates, self.machine.record.isolated,
             )  # fmt: skip
             most = brackets.owner.size if self.decides else MOST_KINKS * batch
             if not brackets.complete and self.machine.overdrawn():  # more of it might help

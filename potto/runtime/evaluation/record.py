@@ -17,6 +17,7 @@ from msgspec import Struct, field
 from potto.core.terms import Term
 from potto.integrate import costs
 from potto.integrate.costs import Costs
+from potto.integrate.decomposition.root_isolation import Isolated
 from potto.integrate.events import Events, OneSidedDerivatives, Shortfall, TwoSided
 from potto.kernels.cells import Array, Value
 from potto.kernels.tape import Node
@@ -116,6 +117,7 @@ class Record(Struct):
     within: the error up to which what cancels is 0 as accurately as asked for, of all or of each of the batch.
     culled: integrals that are 0 for certain, and were not evaluated. seen: such as were answered without a plan.
     cells: on how many stretches roots have been looked for; each counts as an evaluation where a budget is asked.
+    isolated: the roots that were found.
     start, members: how much had been done before what counts, and for how many members this is.
     boxes, most_boxes: in how many boxes places have been searched for, and in how many they may be for each member.
     """
@@ -132,6 +134,7 @@ class Record(Struct):
     start: int = 0
     members: int = 1
     cells: int = 0
+    isolated: Isolated = field(default_factory=Isolated)
     boxes: int = 0
     most_boxes: int = MOST_BOXES
     integrals: int = 0
