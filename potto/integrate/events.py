@@ -302,7 +302,9 @@ class Events:
         return iter(self._met.values())
 
     def note(self, event: Event, members: Members = None) -> None:
-        """Add an event, or the members that met it as well."""
+        """Add an event, or the members that met it as well. What no member has met says nothing."""
+        if members is not None and not np.size(members):
+            return
         if members is not None:
             members, places = np.unique(members, return_index=True)
             event = event.at(places)
