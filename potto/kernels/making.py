@@ -19,6 +19,8 @@ class Counts(Struct):
     reused: int = 0
     seconds: float = 0.0
     kernel_seconds: float = 0.0  # of these
+    worked: float = 0.0  # seconds of the processor
+    kernels_worked: float = 0.0
     native: int = 0
     kept: int = 0
     native_seconds: float = 0.0
@@ -34,23 +36,26 @@ counts = Counts()
 
 
 class _Making(threading.local):
-    """`with making:` adds the time of the block, in this thread, to those seconds of `counts`."""
+    """`with making:` adds the time of the block, in this thread, to those seconds of `counts`: by the clock, and of the
+    processor, which others may be using as well."""
 
     depth = 0
-    start = 0.0
+    start = worked = 0.0
 
-    def __init__(self, seconds: str) -> None:
-        self.seconds = seconds
+    def __init__(self, by_the_clock: str, by_the_processor: str) -> None:
+        self.names = by_the_clock, by_the_processor
 
     def __enter__(self) -> None:
         if not self.depth:
-            self.start = time.perf_counter()
+            self.start, self.worked = time.perf_counter(), time.thread_time()
         self.depth += 1
 
     def __exit__(self, *exc: object) -> None:
         self.depth -= 1
         if not self.depth:
-            setattr(counts, self.seconds, getattr(counts, self.seconds) + time.perf_counter() - self.start)
+            spent = time.perf_counter() - self.start, time.thread_time() - self.worked
+            for name, seconds in zip(self.names, spent, strict=True):
+                setattr(counts, name, getattr(counts, name) + seconds)
 
 
-making, compiling = _Making("seconds"), _Making("kernel_seconds")
+making, compiling = _Making("seconds", "worked"), _Making("kernel_seconds", "kernels_worked")

@@ -26,6 +26,7 @@ from msgspec.structs import asdict, replace
 from potto.diagnostics import PottoError
 from potto.integrate.costs import counting, wanted
 from potto.kernels.cells import Value, all_arrays, map_arrays
+from potto.kernels.making import counts
 from potto.projects.settings import Settings, current, executor, settings
 from potto.python.arguments import Batch, cut, flattened
 from potto.runtime.answers.batches import joined, unfinished, with_what_was_made
@@ -45,8 +46,9 @@ LEAST = 2048  # members, from which on a batch has blocks: below, the calls for 
 PILOT, MOST = 1 << 6, 1 << 18
 ENOUGH, LITTLE, LONG = 0.1, 0.005, 1.0
 FALLS = 0.6
-# Seconds, less than which a run may only have been slow because something was made for it: the first one, and one whose
-# members cost so many times what those of fewer did (kernels are made at the size that first needs them).
+# The first block is asked again: what it takes may only be what everything takes for the first time. So is a larger one
+# that takes less than COLD seconds, if a member of it costs DEARER times what one cost before: kernels are made at the
+# size that first needs them.
 COLD, DEARER = 2.0, 2.0
 # How many times as large blocks are tried where those twice as large cost as much; if a batch has so many at least.
 AHEAD, BLOCKS = 8, 64
@@ -175,7 +177,8 @@ class _Tiles(Struct):
         tried, each = size, math.inf
         while not most and 2 * size <= self.count and size < MOST:
             self._alone((0, size))
-            if ENOUGH <= self.spent < COLD and (each == math.inf or self.spent > DEARER * each * size):
+            cold = each == math.inf or (self.spent < COLD and self.spent > DEARER * each * size)
+            if cold and self.spent >= ENOUGH:
                 self._put_aside()
                 self._alone((0, size))
             fallen, each = self.spent < FALLS * each * size, self.spent / size
@@ -229,10 +232,10 @@ class _Tiles(Struct):
         self.done.clear()
 
     def _alone(self, block: Part) -> Estimate:
-        start, worked = time.perf_counter(), time.process_time()
+        # By the clock, a processor that others use as well would be a slow function.
+        start, making = time.thread_time(), counts.worked
         found = self.done[block[0]] = self.here(block)
-        # By the clock, a processor that others use as well is no slow function.
-        self.spent = min(time.perf_counter() - start - found.compile_seconds, time.process_time() - worked)
+        self.spent = time.thread_time() - start - (counts.worked - making)
         return found
 
     def _shared(self, pool: Executor, rest: list[Part], told: Callable[[float, int], None]) -> None:

@@ -15,7 +15,7 @@ import pytest
 
 import potto
 from potto.kernels.making import counts
-from potto.kernels.native import objects, promotion
+from potto.kernels.native import objects, points, promotion
 
 needs_llvm = pytest.mark.skipif(importlib.util.find_spec("llvmlite") is None, reason="llvmlite is not installed")
 TEXT = "def f(c) integral ([0, 1], [0, 1]) 1/(x + y + c + 2)^2*[x + y + c >= 0] d(x, y)"
@@ -54,6 +54,22 @@ def test_numpy_answers_first_and_machine_code_takes_over() -> None:
             if counts.native_points > before:
                 return
     raise AssertionError("machine code never took over")
+
+
+@needs_llvm
+def test_the_text_of_a_long_function_waits_until_it_would_pay(monkeypatch: pytest.MonkeyPatch) -> None:
+    """How long it is at the least its kernel tells: 500 roots are thousands of lines, 0.1 s for LLVM and who writes
+    them, and 2,000 places take numpy 10 ms."""
+    written: list[int] = []
+    text_of = points.Pointwise.text
+    monkeypatch.setattr(points.Pointwise, "text", lambda self: written.append(1) or text_of(self))
+    objects.compiler()  # so that nothing waits for it
+    function = potto.compile("def f(c) " + " + ".join(f"sqrt(c + {k}.0625)" for k in range(3, 503))).f
+    exact = np.sqrt(WHERE[:, None] + np.arange(3, 503) + 0.0625).sum(axis=1)
+    with potto.settings(backend="auto"):
+        assert function(WHERE).value == pytest.approx(exact, rel=1e-13)
+        assert function(WHERE).value == pytest.approx(exact, rel=1e-13)
+    assert not written
 
 
 @needs_llvm

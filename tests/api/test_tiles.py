@@ -21,6 +21,7 @@ import numpy as np
 import pytest
 
 import potto
+from potto.kernels.making import making
 from potto.python import tiles
 from potto.python.workers import Workers
 from potto.runtime.answers.batches import INTERRUPTED
@@ -233,6 +234,33 @@ def test_what_is_made_for_a_larger_block_does_not_count_as_its_members(monkeypat
     monkeypatch.setattr(tiles._Tiles, "_alone", alone)
     asked: Any = (25600, lambda part: None, lambda parts: None, "made")
     assert tiles._Tiles(*asked)._size() == 1024
+
+
+def test_the_first_block_is_asked_again_however_long_it_takes(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is met for the first time may take seconds: the blocks after it are no larger for it, nor smaller."""
+    for name, seconds in (("ENOUGH", 0.1), ("LONG", 1.0)):
+        monkeypatch.setattr(tiles, name, seconds)
+    first = iter([5.0])
+    assert size_by(monkeypatch, 25600, lambda members: 0.13 + 0.00025 * members + next(first, 0.0)) == 4096
+
+
+def test_blocks_are_timed_without_what_is_made_for_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    """By the processor: one that others use as well is no slow function, and what is made is made once."""
+
+    def here(part: tuple[int, int]) -> None:
+        with making:
+            work(0.2)
+        work(0.05)
+        time.sleep(0.1)
+
+    def work(seconds: float) -> None:
+        start = time.thread_time()
+        while time.thread_time() - start < seconds:
+            pass
+
+    batch = tiles._Tiles(1 << 14, here, lambda parts: None, "timed")  # type: ignore[arg-type, return-value]
+    batch._alone((0, 64))
+    assert 0.05 <= batch.spent < 0.1
 
 
 def test_errors_of_answers_that_are_arguments_count_wherever_they_are_evaluated() -> None:
