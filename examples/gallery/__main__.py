@@ -1,7 +1,7 @@
 """The gallery: pictures of the examples with their times and errors, made in one run.
 
-`python examples/gallery [--quick] [--out FOLDER] [FOLDER…]`. What is shown stands in a table beside the programs,
-`examples/*/gallery.toml`; `tables` says how one is written.
+`python examples/gallery [--quick] [--workers N] [--out FOLDER] [FOLDER…]`. What is shown stands in a table beside the
+programs, `examples/*/gallery.toml`; `tables` says how one is written. Each processor makes one entry after the other.
 """
 
 from __future__ import annotations
@@ -13,7 +13,9 @@ from pathlib import Path
 
 from made import Made, make
 from pages import contact_sheet, index
-from tables import TableError, chapters
+from tables import Chapter, TableError, chapters
+
+from potto.python.workers import Workers
 
 HERE = Path(__file__).resolve().parent
 TARGET = HERE.parents[1] / "docs" / "gallery"
@@ -24,6 +26,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("folders", nargs="*", metavar="FOLDER", help="which of examples/ (default: all with a table)")
     parser.add_argument("--out", type=Path, default=TARGET, help="where the pages go (default: docs/gallery)")
     parser.add_argument("--quick", action="store_true", help="small pictures and few points, to see that all runs")
+    parser.add_argument("--workers", metavar="N", type=int, help="processes (default: as many as there are processors)")
     parser.add_argument("--root", type=Path, default=HERE.parent, help=argparse.SUPPRESS)
     options = parser.parse_args(arguments)
     try:
@@ -33,13 +36,7 @@ def main(arguments: list[str] | None = None) -> int:
         return 2
     options.out.mkdir(parents=True, exist_ok=True)
     start = time.perf_counter()
-    made: list[tuple[str, str, list[Made]]] = []
-    for chapter in found:
-        entries = []
-        for entry in chapter.entries:
-            print(f"{chapter.name}: {entry.title}", flush=True)
-            entries.append(make(entry, chapter, options.out, options.quick))
-        made.append((chapter.title, chapter.about, entries))
+    made = entries_made(found, options)
     seconds = time.perf_counter() - start
     (options.out / "index.html").write_text(index(made, options.out, seconds), encoding="utf-8")
     (options.out / "contact.svg").write_text(contact_sheet(made, options.out), encoding="utf-8")
@@ -49,6 +46,23 @@ def main(arguments: list[str] | None = None) -> int:
     count = sum(len(entry.files) for _, _, entries in made for entry in entries)
     print(f"{count} pictures in {seconds:.0f} s: {options.out / 'index.html'}")
     return 1 if failures else 0
+
+
+def entries_made(found: list[Chapter], options: argparse.Namespace) -> list[tuple[str, str, list[Made]]]:
+    """By chapter its title, what it is about, and its entries as they have been made."""
+    with Workers(options.workers) as pool:
+        tasks = [
+            (chapter, [pool.submit(make, entry, chapter, options.out, options.quick) for entry in chapter.entries])
+            for chapter in found
+        ]
+        made = []
+        for chapter, waiting in tasks:
+            entries = []
+            for task in waiting:
+                entries.append(task.result())
+                print(f"{chapter.name}: {entries[-1].title}", flush=True)
+            made.append((chapter.title, chapter.about, entries))
+    return made
 
 
 if __name__ == "__main__":

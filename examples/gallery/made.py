@@ -98,6 +98,8 @@ def _picture(entry: Picture, chapter: Chapter, out: Path, stem: str, quick: bool
         str(chapter.folder / f"{entry.program}.po"),
         entry.function,
         "--json",
+        "--workers",
+        "1",
         "-o",
         str(out / f"{stem}.png"),
     ]

@@ -23,6 +23,7 @@ sys.path.append(str(EXAMPLES / "gallery"))
 from tables import Chapter, Curve, Picture, chapters  # noqa: E402
 
 import potto  # noqa: E402
+from potto.python.workers import Workers  # noqa: E402
 
 TOLERANCE, SLOWEST = 1e-8, 20.0
 
@@ -199,15 +200,21 @@ def checked(entry: Curve | Picture, chapter: Chapter, depth: Depth) -> Checked:
 
 
 def main() -> None:
+    """Each processor checks one entry after the other; times are those that it works."""
     bad = 0
-    for chapter in chapters(EXAMPLES, sys.argv[1:]):
-        print(chapter.name, flush=True)
-        for entry in chapter.entries:
-            if isinstance(entry, Curve | Picture):
-                found = checked(entry, chapter, AS_SHOWN)
-                slow = isinstance(entry, Picture) and found.slowest > SLOWEST
-                bad += bool(found.wrong or slow)
-                print(f"{found}{'  WRONG' if found.wrong else ''}{'  SLOW' if slow else ''}", flush=True)
+    with Workers() as pool:
+        tasks = [
+            (chapter, entry, pool.submit(checked, entry, chapter, AS_SHOWN))
+            for chapter in chapters(EXAMPLES, sys.argv[1:])
+            for entry in chapter.entries
+            if isinstance(entry, Curve | Picture)
+        ]
+        for chapter, entry, task in tasks:
+            found = task.result()
+            slow = isinstance(entry, Picture) and found.slowest > SLOWEST
+            bad += bool(found.wrong or slow)
+            marks = f"{'  WRONG' if found.wrong else ''}{'  SLOW' if slow else ''}"
+            print(f"{chapter.name:12}{found}{marks}", flush=True)
     sys.exit(f"{bad} are not good to {TOLERANCE:.0e}, or have slow pixels" if bad else 0)
 
 
