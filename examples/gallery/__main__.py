@@ -11,8 +11,9 @@ import sys
 import time
 from pathlib import Path
 
-from made import Made, make
-from pages import contact_sheet, index
+from besides import besides
+from made import make
+from pages import Section, contact_sheet, index
 from tables import Chapter, TableError, chapters
 
 from potto.python.workers import Workers
@@ -40,28 +41,32 @@ def main(arguments: list[str] | None = None) -> int:
     seconds = time.perf_counter() - start
     (options.out / "index.html").write_text(index(made, options.out, seconds), encoding="utf-8")
     (options.out / "contact.svg").write_text(contact_sheet(made, options.out), encoding="utf-8")
-    failures = [e for _, _, entries in made for e in entries if e.failure]
+    failures = [entry for section in made for entry in section.entries if entry.failure]
     for failed in failures:
         print(f"gallery: {failed.title}: {failed.failure}", file=sys.stderr)
-    count = sum(len(entry.files) for _, _, entries in made for entry in entries)
+    count = sum(len(entry.files) for section in made for entry in section.entries)
     print(f"{count} pictures in {seconds:.0f} s: {options.out / 'index.html'}")
     return 1 if failures else 0
 
 
-def entries_made(found: list[Chapter], options: argparse.Namespace) -> list[tuple[str, str, list[Made]]]:
-    """By chapter its title, what it is about, and its entries as they have been made."""
+def entries_made(found: list[Chapter], options: argparse.Namespace) -> list[Section]:
+    """The chapters with their entries as they have been made, and beside samples."""
     with Workers(options.workers) as pool:
         tasks = [
-            (chapter, [pool.submit(make, entry, chapter, options.out, options.quick) for entry in chapter.entries])
+            (
+                chapter,
+                [pool.submit(make, entry, chapter, options.out, options.quick) for entry in chapter.entries],
+                pool.submit(besides, chapter.name),
+            )
             for chapter in found
         ]
         made = []
-        for chapter, waiting in tasks:
+        for chapter, waiting, compared in tasks:
             entries = []
             for task in waiting:
                 entries.append(task.result())
                 print(f"{chapter.name}: {entries[-1].title}", flush=True)
-            made.append((chapter.title, chapter.about, entries))
+            made.append(Section(chapter.title, chapter.about, entries, compared.result()))
     return made
 
 

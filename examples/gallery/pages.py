@@ -6,11 +6,12 @@ import base64
 import html
 import textwrap
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
+from besides import Beside
 from made import Made, Shown
 
-Chapters = Sequence[tuple[str, str, Sequence[Made]]]
 STYLE = """
 :root{color-scheme:light dark;--paper:#fff;--ink:#222;--faint:#666;--line:#ddd}
 @media(prefers-color-scheme:dark){:root{--paper:#101216;--ink:#e4e4e4;--faint:#9a9a9a;--line:#333}}
@@ -20,12 +21,22 @@ h2{border-top:1px solid var(--line);padding-top:1.5rem;margin-top:2.5rem}p,figca
 .row{display:flex;flex-wrap:wrap;gap:1rem}figure{margin:0}figcaption{font-size:.8rem}
 figure img{height:15rem;max-width:100%;border-radius:6px;border:1px solid var(--line)}
 .drawn img{image-rendering:pixelated}
-code{font-size:.85em}.measured{font-size:.85rem}
+code{font-size:.85em}th,td{text-align:left;vertical-align:top;padding:.1rem .8rem .1rem 0}.measured{font-size:.85rem}
 """
 # Of the sheet: its width, what is between cells, above a chapter and below a picture for how many lines, and how wide a
 # letter is
 SHEET, GAP, HEADING, LABEL, LINES, LETTER = 1072, 12, 40, 76, 4, 6.2
 DRAWN, ENLARGED = ' class="drawn"', 240  # the index shows pictures 15 rem high
+
+
+@dataclass(frozen=True)
+class Section:
+    """A chapter: its entries as they were made, and its programs beside samples."""
+
+    title: str
+    about: str
+    entries: Sequence[Made]
+    besides: Sequence[Beside]
 
 
 def _measured(entry: Made) -> str:
@@ -51,8 +62,8 @@ def _kind(file: Path) -> str:
     return DRAWN if width < ENLARGED else ""
 
 
-def index(chapters: Chapters, folder: Path, seconds: float) -> str:
-    count = sum(len(entry.files) for _, _, entries in chapters for entry in entries)
+def index(chapters: Sequence[Section], folder: Path, seconds: float) -> str:
+    count = sum(len(entry.files) for section in chapters for entry in section.entries)
     parts = [
         '<!doctype html><html lang="en"><meta charset="utf-8"><title>Potto: the gallery</title>',
         f'<meta name="viewport" content="width=device-width"><style>{STYLE}</style><h1>Gallery</h1>',
@@ -60,25 +71,49 @@ def index(chapters: Chapters, folder: Path, seconds: float) -> str:
         '<code>make gallery</code>; <a href="contact.svg">all of them on one sheet</a>. Values go from black to white, '
         "and derivatives from blue through white, which is 0, to red; captions name the numbers at both ends.</p>",
     ]
-    for title, about, entries in chapters:
-        parts.append(f"<h2>{html.escape(title)}</h2><p>{html.escape(about)}</p>")
-        for entry in entries:
+    for section in chapters:
+        parts.append(f"<h2>{html.escape(section.title)}</h2><p>{html.escape(section.about)}</p>")
+        for entry in section.entries:
             parts.append(f"<h3>{html.escape(entry.title)}</h3><p>{html.escape(entry.about)}</p>" if entry.about
                          else f"<h3>{html.escape(entry.title)}</h3>")  # fmt: skip
             parts.append(f'<div class="row">{"".join(_figure(shown, folder) for shown in entry.files)}</div>')
             said = f"not made: {html.escape(entry.failure)}" if entry.failure else _measured(entry)
             parts.append(f'<p class="measured">{said}</p>')
+        parts.append(_compared(section.besides))
     return "\n".join([*parts, "</html>\n"])
 
 
-def contact_sheet(chapters: Chapters, folder: Path) -> str:
+def _compared(besides: Sequence[Beside]) -> str:
+    """Programs beside those that sum up samples and differentiate the sum."""
+    if not besides:
+        return ""
+    rows = []
+    for beside in besides:
+        of = beside.numbers
+        numbers = [
+            f"{of.value:.8g}",
+            f"{of.sampled:.8g}",
+            f"{of.slope:.8g} ± {of.error:.0e}",
+            f"{of.sampled_slope:.8g}",
+        ]
+        times = [f"{1e3 * seconds:.1f} ms" for seconds in (of.seconds, of.sampled_seconds)]
+        source = f'<a href="{html.escape(beside.address)}">{html.escape(beside.source)}</a>' if beside.address else ""
+        cells = [f"<code>{html.escape(beside.program)}</code>", *numbers, *times]
+        rows.append("".join(f"<td>{cell}</td>" for cell in [*cells, f"{html.escape(beside.said)} {source}"]))
+    heads = ("program", "value", "of samples", "derivative", "of their sum", "time", "of samples", "elsewhere")
+    head = "".join(f"<th>{name}</th>" for name in heads)
+    body = "".join(f"<tr>{row}</tr>" for row in rows)
+    return f'<h3>Beside samples</h3><table class="measured"><tr>{head}</tr>{body}</table>'
+
+
+def contact_sheet(chapters: Sequence[Section], folder: Path) -> str:
     """All pictures in one SVG, which holds them: it can be shown by itself. Chapters and their curves begin rows."""
     parts: list[str] = []
     y = GAP
-    for title, _, entries in chapters:
+    for section in chapters:
         y += HEADING
-        parts.append(f'<text class="heading" x="{GAP}" y="{y - 12}">{html.escape(title)}</text>')
-        shown = [(entry.title, _on_sheet(entry, picture)) for entry in entries for picture in entry.files]
+        parts.append(f'<text class="heading" x="{GAP}" y="{y - 12}">{html.escape(section.title)}</text>')
+        shown = [(entry.title, _on_sheet(entry, picture)) for entry in section.entries for picture in entry.files]
         curves = [cell for cell in shown if cell[1].file.endswith(".svg")]
         for cells, across, shape in (([c for c in shown if c not in curves], 6, 1.0), (curves, 4, 2 / 3)):
             width = (SHEET - GAP) / across - GAP

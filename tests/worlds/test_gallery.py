@@ -97,6 +97,14 @@ def test_one_that_fails_does_not_stop_the_others(examples: Path, tmp_path: Path)
     assert (out / "small-a-disc.png").exists() and "not made" in (out / "index.html").read_text(encoding="utf-8")
 
 
+def test_programs_are_shown_beside_samples(tmp_path: Path) -> None:
+    done = gallery("paper", "--out", str(tmp_path))
+    assert done.returncode == 0, done.stderr
+    page = (tmp_path / "index.html").read_text(encoding="utf-8")
+    row = page.partition("<code>paper/image</code>")[2].partition("</tr>")[0]
+    assert "-0.19649107" in row and "github.com/ChezJrk/Teg" in row  # the slope of the sum lacks the edge
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("table", TABLES, ids=lambda file: file.parent.name)
 def test_the_gallery_of_a_folder(table: Path, tmp_path: Path) -> None:
