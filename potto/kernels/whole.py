@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -126,11 +126,20 @@ def slopes(tangent: Any, *factors: Any) -> Any:
     exact: nothing as long as all are whole, so that the slope of 2*x is 2, and not 2 give or take something. Summands
     may cancel."""
     pairs = list(zip(factors[::2], factors[1::2], strict=True))
-    products = [a * b for a, b in pairs]
     if isinstance(tangent, np.ndarray) and tangent.size > _looking.most:
-        return max(len(pairs), 2) * UNIT_ROUNDOFF * sum(map(abs, products))
+        return max(len(pairs), 2) * UNIT_ROUNDOFF * _sizes(pairs)
+    products = [a * b for a, b in pairs]
     off = sum(0.0 if _is_one(a) or _is_one(b) else mul(p, a, b) for p, (a, b) in zip(products, pairs, strict=True))
     return off if len(pairs) == 1 else off + add(tangent, *products)
+
+
+def _sizes(pairs: Sequence[tuple[Any, Any]]) -> Any:
+    """The sum of the sizes of products; the slopes of sums are 1."""
+    total: Any = None
+    for a, b in pairs:
+        size = abs(b) if _is_one(a) else abs(a * b)
+        total = size if total is None else total + size
+    return total
 
 
 def _is_one(x: Any) -> bool:

@@ -70,7 +70,7 @@ class Batch(Struct, frozen=True):
         ):
             return estimate
         parts = (estimate.value, estimate.error, estimate.tangent, estimate.tangent_error)
-        value, error, tangent, tangent_error = map(self._restored, parts)
+        value, error, tangent, tangent_error = map(self.restored, parts)
         shaped = replace(estimate, value=value, error=error, tangent=tangent, tangent_error=tangent_error)
         if self.shape is None:
             return replace(shaped, member_converged=None, shortfalls=dict.fromkeys(estimate.shortfalls, True))
@@ -86,7 +86,7 @@ class Batch(Struct, frozen=True):
         try:
             return self._columns(items)
         except (TypeError, ValueError):
-            return [self._restored(item) for item in items]
+            return [self.restored(item) for item in items]
 
     def _columns(self, items: list[Any]) -> Any:
         """Items of one form, part by part: arrays have hundreds of thousands of them. Raises TypeError, ValueError."""
@@ -96,7 +96,7 @@ class Batch(Struct, frozen=True):
             return np.stack([self._columns(list(column)) for column in columns], axis=axis + 1)
         if self.shape is None:
             return np.array(list(map(float, items)))
-        return np.stack([self._restored(item) for item in items], axis=axis)
+        return np.stack([self.restored(item) for item in items], axis=axis)
 
     def _mask(self, mask: Any) -> Any:
         """A mask of the batch's members in its shape."""
@@ -104,13 +104,19 @@ class Batch(Struct, frozen=True):
         count = int(np.prod(self.shape))
         return np.broadcast_to(np.asarray(mask).reshape(-1)[:count], (count,)).reshape(self.shape)
 
-    def _restored(self, part: Any) -> Any:
+    @property
+    def everybody(self) -> Any:
+        """A mask of all members."""
+        return np.ones(self.shape or (), dtype=bool)
+
+    def restored(self, part: Any) -> Any:
+        """A part of an answer as an array of the batch's shape."""
         if part is None:
             return None
         if isinstance(part, list):
             return self._array(part)
         if isinstance(part, tuple):
-            return alike(part, [self._restored(item) for item in part])
+            return alike(part, [self.restored(item) for item in part])
         if self.shape is None:
             return float(part)
         if 0 in self.shape:

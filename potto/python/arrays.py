@@ -1,9 +1,9 @@
 """Arrays of Python as arrays of Potto: what a parameter's type says which axes of numpy's are.
 
-Owns `with_arrays`, `axes_of`, `over_batch` and `batch_shapes`. A parameter `[n] Real` takes a numpy array, a column of
-a table or a list as one array, and the axes before those of the array are a batch; a parameter `Real` takes a numpy
-array as a batch. Until all batches are known, the parts of such an array have its axes first and then those of its
-own batch.
+Owns `with_arrays`, `axes_of`, `over_batch`, `batch_shapes` and `shape_together`. A parameter `[n] Real` takes a numpy
+array, a column of a table or a list as one array, and the axes before those of the array are a batch; a parameter
+`Real` takes a numpy array as a batch. Until all batches are known, the parts of such an array have its axes first and
+then those of its own batch.
 """
 
 from __future__ import annotations
@@ -22,6 +22,19 @@ from potto.types import format_type
 from potto.types.types import ArrayOf, Count, Dist, Real, RecordName, Shifted, SizeVar, TupleOf, Type, resolve
 
 Sizes = dict[str, tuple[str, int]]  # of names of sizes: the parameter that says how many, and the number
+
+
+def is_batch(argument: Any) -> bool:
+    """Whether an argument is an array of numpy with axes."""
+    return argument.__class__ is np.ndarray and argument.ndim > 0
+
+
+def shape_together(arguments: Sequence[Any]) -> tuple[int, ...] | None:
+    """The shape that the arrays among arguments broadcast to; None where there are none, or they do not."""
+    shapes = [argument.shape for argument in arguments if is_batch(argument)]
+    with contextlib.suppress(ValueError):
+        return np.broadcast_shapes(*shapes) if shapes else None
+    return None
 
 
 def with_arrays(name: str, argument: Any, type: Type, sizes: Sizes) -> Any:

@@ -12,7 +12,6 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Literal
 
-import numpy as np
 from msgspec import Struct
 from msgspec.structs import asdict, replace
 
@@ -22,7 +21,9 @@ from potto.integrate.costs import wanted
 from potto.kernels.cells import Cell, Value
 from potto.projects.settings import Settings
 from potto.python.arguments import LARGEST, Batch, with_axes, without_axes
+from potto.python.arrays import is_batch, shape_together
 from potto.python.tiles import LEAST
+from potto.runtime.answers.convergence import precise
 from potto.runtime.answers.estimate import Estimate
 from potto.runtime.evaluate import Clock, Program, bar, number, report, stats_of
 from potto.runtime.evaluation.duals import merge
@@ -143,13 +144,10 @@ class Together(Kept, frozen=True, eq=False):
 
     def answer(self, args: tuple[Any, ...], settings: Settings) -> Estimate | None:
         """As of `AtOnce`, for arrays that make a batch of several members that is not done in tiles."""
-        arrays = [arg for arg in args if arg.__class__ is np.ndarray]
-        if not arrays or not self.asked(args, settings):
+        shape = shape_together(args)
+        if shape is None or not self.asked(args, settings):
             return None
-        try:
-            batch = Batch(np.broadcast_shapes(*(array.shape for array in arrays)))
-        except ValueError:
-            return None
+        batch = Batch(shape)
         env = self._env(args, batch) if 1 < batch.size < LEAST else None
         if env is None:
             return None
@@ -164,12 +162,13 @@ class Together(Kept, frozen=True, eq=False):
         """The estimate of an integral; whether it is what was asked for needs no thought where each number is."""
         record, parts = machine.record, list(zip((cell.v, *cell.t), (cell.e, *cell.et), strict=True))
         plain = not (machine.events or record.edges or record.shortfalls)
-        if plain and all(_precise(x, e, self.settings.rtol) for x, e in parts):
-            numbers, errors = ([np.array(x).reshape(batch.shape) for x in side] for side in zip(*parts, strict=True))
+        known = plain and all(x is not None and e is not None for x, e in parts)
+        if known and all(precise(x, e, self.settings.rtol) for x, e in parts):
+            numbers, errors = ([batch.restored(x) for x in side] for side in zip(*parts, strict=True))
             return self.estimate(
                 numbers, errors, evals=record.evaluations, seconds=clock.seconds, compile_seconds=clock.spent,
                 plan_seconds=clock.planning, stats=stats_of(record, clock),
-                member_converged=np.ones(batch.shape, dtype=bool),
+                member_converged=batch.everybody,
             )  # fmt: skip
         found = report(cell, machine, clock)
         if not self.wrt:
@@ -182,10 +181,10 @@ class Together(Kept, frozen=True, eq=False):
     def _env(self, args: tuple[Any, ...], batch: Batch) -> dict[str, Value] | None:
         env: dict[str, Value] = {}
         for read, arg in zip(self.reads, args, strict=True):
-            if arg.__class__ is np.ndarray and arg.ndim:
+            if is_batch(arg):
                 if read.kind != "number" or arg.dtype.kind not in "fiu":
                     return None
-                env[read.name] = Cell(batch.flat(arg.astype(np.float64)), None, read.t, read.et)
+                env[read.name] = Cell(batch.flat(arg.astype(float)), None, read.t, read.et)
                 continue
             value = read.of(arg)
             if value is None:
@@ -208,14 +207,6 @@ def together(
     return Together(
         machine.settings, tuple(read for read in reads if read is not None), type(found), wrt, False, batches
     )
-
-
-def _precise(numbers: Any, errors: Any, rtol: float) -> bool:
-    """Whether each number is there, finite and known to this part of it."""
-    if numbers is None or errors is None:
-        return False
-    size = np.abs(numbers)
-    return bool((errors <= rtol * size).all() and (size < np.inf).all())
 
 
 def at_once(
@@ -261,12 +252,7 @@ def _read(name: str, arg: Any, value: Value, dual: bool) -> Read | None:
         known = getattr(arg, "_value", None)
         return None if known is None else Read(name, "function", part=known())
     moving = merge(value) if dual and not isinstance(value, list) else value
-    if (
-        type(moving) is not Cell
-        or moving.e is not None
-        or any(moving.et)
-        or any(isinstance(t, np.ndarray) for t in moving.t)
-    ):
+    if type(moving) is not Cell or moving.e is not None or any(moving.et) or Cell(0.0, None, moving.t).arrays():
         return None
     if isinstance(value, tuple):
         return Read(name, "dual", moving.t, moving.et, arg[1]) if arg.__class__ is tuple else None

@@ -1,6 +1,6 @@
 """Whether an answer is as accurate as was asked for; and if not, why, member by member.
 
-Owns `Shortfalls`, `missed`, `missing`, `rounded` and `allowance`. Converged means: the error is within
+Owns `Shortfalls`, `missed`, `missing`, `precise`, `rounded` and `allowance`. Converged means: the error is within
 `rtol * |value|`, or within `atol`. An answer that is 0 because its parts cancel has no digits that could be relative to
 it. It is accurate enough if it is relative to what is added up without regard to sign: there its error is within
 `rtol`, and within CANCELS, which is what rounding leaves. That is no licence to lose a small summand beside large ones
@@ -106,7 +106,7 @@ def missing(term: Integral, sums: Sums, settings: Settings, env: dict[str, Value
     measured by it."""
     out: Bools = np.zeros(sums.v.shape[-1], dtype=bool)
     whole = together(env, sums.v)
-    if whole is sums.v and _each(sums.v, sums.e, settings.rtol) and _each(sums.t, sums.et, settings.rtol):
+    if whole is sums.v and precise(sums.v, sums.e, settings.rtol) and precise(sums.t, sums.et, settings.rtol):
         return out  # as mostly, whatever else would do
     within: Array | None = None
     for number, error in ((whole, sums.e), (sums.t, sums.et)):
@@ -130,7 +130,7 @@ def missing(term: Integral, sums: Sums, settings: Settings, env: dict[str, Value
     return out
 
 
-def _each(numbers: Array, errors: Array, rtol: float) -> bool:
+def precise(numbers: Array, errors: Array, rtol: float) -> bool:
     """Whether each number is finite and known to this part of it."""
     size = np.abs(numbers)
     return bool((errors <= rtol * size).all() and (size < np.inf).all())
