@@ -87,6 +87,16 @@ def test_few_members_get_the_nodes_that_are_proved_for_many(count: int) -> None:
         assert abs(answer.value[i] - exact) <= answer.error[i] <= 1e-14
 
 
+def test_what_is_proved_for_a_batch_is_known_of_others() -> None:
+    """Values that are each a little larger lie in the same regions, so that nothing is made any more."""
+    shade = "1/(sqrt(2)*(x + y + c) + 2)^2"
+    program = potto.compile(f"def f(c) integral ([0, 1], [0, 1]) {shade} * [x + y + c >= 0] d(x, y)")
+    slope, c = potto.grad(program.f, "c"), np.linspace(-1.99, -0.02, 300)
+    with potto.settings(backend="numpy"):
+        assert slope(c).compile_seconds > 0
+        assert [slope(c + d).compile_seconds for d in (0.0, 1e-4, 2e-3)] == [0.0] * 3
+
+
 @pytest.mark.parametrize("order", ["x, y", "y, x"])
 def test_circles_turn_at_both_ends(order: str) -> None:
     r = np.linspace(0.2, 0.95, 100)

@@ -171,7 +171,7 @@ def _grid(values: dict[str, Number], count: int) -> _Grid | None:
         width = math.ldexp(0.5**fine, math.frexp(high - low)[1]) if high > low else narrow
         widths.append(width)
         radii.append(max(0.5 * width, narrow))
-        narrowest = min(narrowest, radii[-1] / (size or 1.0))
+        narrowest = min(narrowest, radii[-1] / narrow * NARROWEST)  # of the power of two above the size
     return _Grid(FEW if moving < 2 else 2 * LEAST, tuple(ends), tuple(widths), tuple(radii), narrowest)
 
 
