@@ -162,8 +162,7 @@ class Together(Kept, frozen=True, eq=False):
         """The estimate of an integral; whether it is what was asked for needs no thought where each number is."""
         record, parts = machine.record, list(zip((cell.v, *cell.t), (cell.e, *cell.et), strict=True))
         plain = not (machine.events or record.edges or record.shortfalls)
-        known = plain and all(x is not None and e is not None for x, e in parts)
-        if known and all(precise(x, e, self.settings.rtol) for x, e in parts):
+        if plain and all(precise(x, e, self.settings.rtol) for x, e in parts):
             numbers, errors = ([batch.restored(x) for x in side] for side in zip(*parts, strict=True))
             return self.estimate(
                 numbers, errors, evals=record.evaluations, seconds=clock.seconds, compile_seconds=clock.spent,

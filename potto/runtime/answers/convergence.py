@@ -32,7 +32,7 @@ from potto.integrate.events import (
     Shortfall,
 )
 from potto.integrate.pieces import Sums, added_up, together
-from potto.kernels.cells import Array, Bools, Value
+from potto.kernels.cells import Array, Bools, Number, Value
 from potto.projects.settings import Settings
 
 CANCELS = 1e-12
@@ -130,10 +130,12 @@ def missing(term: Integral, sums: Sums, settings: Settings, env: dict[str, Value
     return out
 
 
-def precise(numbers: Array, errors: Array, rtol: float) -> bool:
-    """Whether each number is finite and known to this part of it."""
+def precise(numbers: Number | None, errors: Number | None, rtol: float) -> bool:
+    """Whether each number is there, finite and known to this part of it."""
+    if numbers is None or errors is None:
+        return False
     size = np.abs(numbers)
-    return bool((errors <= rtol * size).all() and (size < np.inf).all())
+    return bool(np.all(errors <= rtol * size) and np.all(size < np.inf))
 
 
 def rounded(sums: Sums) -> Bools:
