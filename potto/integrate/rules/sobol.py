@@ -1,9 +1,8 @@
 """Scrambled Sobol points, many scramblings at once.
 
-Owns `Sobol`. The direction numbers are scipy's (Joe and Kuo's); the points are made here, since a block of them for
-all scramblings takes a few operations on whole arrays. Each scrambling is a random lower triangular matrix of bits
-for each variable and a digital shift (Matousek, 1998): every point is uniform over the cube, so that means over them
-are unbiased, and the points together keep the net's evenness.
+Owns `Sobol`. A block of points for all scramblings takes a few operations on whole arrays. Each scrambling is a random
+lower triangular matrix of bits for each variable and a digital shift (Matousek, 1998): every point is uniform over the
+cube, so that means over them are unbiased, and the points together keep the net's evenness.
 """
 
 from __future__ import annotations
@@ -14,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from potto.integrate.rules.direction_numbers import direction_numbers
 from potto.kernels.cells import Array, Ints
 
 BITS = 30
@@ -76,12 +76,4 @@ def _parity(x: Ints) -> Ints:
 
 @lru_cache(maxsize=64)
 def _directions(dims: int) -> Ints:
-    """The points with numbers 1, 2, 4, ...: all others are exclusive ors of them. (dims, MOST)"""
-    from scipy.stats import qmc
-
-    engine = qmc.Sobol(dims, scramble=False, bits=BITS)
-    columns = np.zeros((dims, MOST), dtype=np.int64)
-    for b in range(MOST):  # scipy counts in Gray code, where number 2^b comes as the (2^(b + 1) - 1)st
-        engine.fast_forward((2 << b) - 1 - engine.num_generated)
-        columns[:, b] = np.rint(engine.random(1)[0] * 2.0**BITS).astype(np.int64)
-    return columns
+    return direction_numbers(dims, MOST, BITS)
