@@ -32,7 +32,7 @@ class Shown:
     """The derivative of a definition as it is shown, beside the definition in its own file."""
 
     def __init__(self, text: str, name: str, file: str = "<text>") -> None:
-        library = Library([os.path.dirname(file) or "."])
+        self._library = library = Library([os.path.dirname(file) or "."])
         self.file = library.put(file, text)
         type = interface(library.db, self.file, name).type
         self.name, self.groups = name, groups_of(type)
@@ -57,10 +57,9 @@ class Shown:
         return f"def {SHOWN[:-1]}{number}({', '.join(values + tangents)})"
 
     def problems(self) -> list[str]:
-        """What the check of the formula says."""
-        library = Library([os.path.dirname(self.file) or "."])
-        library.put(self.file, self.program)
-        return [located.diagnostic.message for located in library.errors(self.file)]
+        """What the check of the formula says: of the file as it is when that is written below."""
+        self._library.put(self.file, self.program)
+        return [located.diagnostic.message for located in self._library.errors(self.file)]
 
     def module(self) -> potto.Module:
         return potto.Workspace(os.path.dirname(self.file) or ".").compile(self.program)
