@@ -19,7 +19,7 @@ from scipy import special
 import potto
 from potto.calculus.solving.enclosable import slope_of
 from potto.core.terms import add, const, mul, prim, sub, var
-from potto.integrate.decomposition.root_isolation import Isolated, isolated
+from potto.integrate.decomposition.root_isolation import Isolated, isolated, touched
 from potto.integrate.events import BUDGET_SPENT, ROOTS_NOT_SEPARATED
 from potto.integrate.rules.intervals import enclosure
 from potto.kernels.cells import Cell
@@ -232,3 +232,17 @@ def test_powers_of_negative_numbers_have_no_roots() -> None:
     exact = mp.quad(lambda y: 3 ** mp.cos(y), [0, 1])
     assert answer.converged and abs(answer.value - exact) <= answer.error
     assert answer.evals < 200
+
+
+@pytest.mark.parametrize("seed", range(50))
+def test_stretches_that_touch_others_are_known(seed: int) -> None:
+    """As by looking at each of the others; on a grid, so that many only meet at their ends."""
+    rng = np.random.default_rng(seed)
+
+    def stretches(count: int) -> tuple[Any, Any, Any]:
+        start = rng.integers(0, 60, count) / 64
+        return rng.integers(0, 4, count), start, start + rng.integers(0, 5, count) / 64
+
+    some, others = stretches(12), stretches(seed)
+    one_by_one = [((others[0] == o) & (others[2] >= a) & (others[1] <= b)).any() for o, a, b in zip(*some)]
+    assert list(touched(some, others)) == one_by_one

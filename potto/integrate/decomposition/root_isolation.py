@@ -1,9 +1,9 @@
 """Intervals with one root each: of a surface along one variable, for a whole batch at once.
 
-Owns `isolated`, `Isolated`, `flat`, `between` and `at_label`. A cell over which the enclosure of the surface leaves
-out 0 has no root; one over which that of its slope does has at most one, and the signs at its ends tell. All others are
-halved. So no root is missed, however narrow what brings it forth; what is given up on, once there are too many cells,
-is told.
+Owns `isolated`, `Isolated`, `touched`, `flat`, `between` and `at_label`. A cell over which the enclosure of the
+surface leaves out 0 has no root; one over which that of its slope does has at most one, and the signs at its ends tell.
+All others are halved. So no root is missed, however narrow what brings it forth; what is given up on, once there are
+too many cells, is told.
 """
 
 from __future__ import annotations
@@ -133,11 +133,25 @@ def _around_poles(cells: _Cells, owner: Ints, s0: Array, s1: Array, found: list[
     owner, s0, s1 = adjoining(owner, s0, s1)
     width = 2.0**-FINEST
     s0, s1 = np.maximum(s0 - OUTSIDE * width, 0.0), np.minimum(s1 + OUTSIDE * width, 1.0)
-    crossed = cells.crossed(owner, s0, s1)
-    for o, a, b in found:
-        for i in np.nonzero(crossed)[0]:
-            crossed[i] = not ((o == owner[i]) & (b >= s0[i]) & (a <= s1[i])).any()
-    return owner[crossed], s0[crossed], s1[crossed]
+    new = cells.crossed(owner, s0, s1)
+    new[new] = ~touched((owner[new], s0[new], s1[new]), _together(found))
+    return owner[new], s0[new], s1[new]
+
+
+def touched(stretches: _Stretches, others: _Stretches) -> Bools:
+    """Which stretches have a place with one of the others in common: where of those that begin before its end the one
+    that goes furthest does not end before its beginning."""
+    owner, s0, s1 = stretches
+    o, a, b = (part[np.lexsort((others[2], others[0]))] for part in others)  # so that later goes further
+    if not o.size:
+        return np.zeros(owner.size, dtype=bool)
+    furthest: Ints = np.maximum.accumulate(np.lexsort((a, o)))
+    asked = np.repeat((False, True), (o.size, owner.size))
+    order = np.lexsort((asked, np.concatenate((a, s1)), np.concatenate((o, owner))))
+    before = np.cumsum(~asked[order])[np.argsort(order)[o.size :]]
+    last = furthest[np.maximum(before, 1) - 1]
+    found: Bools = (before > 0) & (o[last] == owner) & (b[last] >= s0)
+    return found
 
 
 def adjoining(owner: Ints, s0: Array, s1: Array) -> _Stretches:
