@@ -1,15 +1,15 @@
 """A batch of integrals in which each member gets the answer, the cost and the reasons that it gets by itself.
 
-Owns `by_members`, `one_by_one` and `Whole`. A batch is integrated at once. Members that meet something (a surface that
-runs along a variable, roots that merge, a bound that rounding hides, a budget that is spent) are taken out, since what
-helps them costs the others time and tells nothing of them: those that another order of the variables may help are done
-so together, those at folds together, those with two sides together, those that no order helps in each direction that
-moves them by itself, all others one by one.
+Owns `by_members` and `Whole`. A batch is integrated at once. Members that meet something (a surface that runs along a
+variable, roots that merge, a bound that rounding hides, a budget that is spent) are taken out, since what helps them
+costs the others time and tells nothing of them: those that another order of the variables may help are done so
+together, those at folds together, those with two sides together, those that no order helps in each direction that
+moves them by itself (`directions`), all others one by one.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 
 import numpy as np
 from msgspec.structs import replace
@@ -17,12 +17,12 @@ from msgspec.structs import replace
 from potto.core.terms import Integral
 from potto.integrate.events import Degenerate, Events, Fold, Shortfall, TwoSided, Unsearched
 from potto.integrate.pieces import Sums
-from potto.kernels.cells import Array, Bools, Ints, Value
+from potto.kernels.cells import Array, Bools, Ints
 from potto.kernels.memory import kept
 from potto.runtime.answers.convergence import missing, rounded
-from potto.runtime.evaluation.beside import moving, one_direction
 from potto.runtime.integration.attempts import proved_beforehand
 from potto.runtime.integration.choices import orders, preferred
+from potto.runtime.integration.directions import by_directions
 from potto.runtime.integration.problem import Problem
 from potto.runtime.integration.quadrature import cut_up, iterated, whole_boxes
 
@@ -84,8 +84,7 @@ def by_members(problem: Problem, settled: Settled) -> Sums:
 def _cut(problem: Problem, settled: Settled) -> Sums:
     """The sums of members whose boxes are cut."""
     found = Whole()
-    summed = problem.machine.summed
-    few = PROVED * len(problem.term.variables) if summed else FEW_MEMBERS
+    few = PROVED * len(problem.term.variables) if problem.machine.summed else _singly(problem)
     todo = np.arange(problem.batch) if problem.batch > few else _proved(problem, found)
     alone = [todo] if todo.size <= _singly(problem) else _together(problem, todo, settled, found)
     for i in map(int, np.concatenate(alone)):
@@ -97,8 +96,9 @@ def _cut(problem: Problem, settled: Settled) -> Sums:
 
 
 def _singly(problem: Problem) -> int:
-    """Up to how many members are done one by one; summands need not have the digits of each."""
-    return 1 if problem.machine.summed else FEW_MEMBERS
+    """Up to how many members are done one by one: summands need not have the digits of each, and to one side of the
+    parameters nothing is proved of one by itself."""
+    return 1 if problem.machine.summed or problem.machine.side else FEW_MEMBERS
 
 
 def _proved(problem: Problem, found: Whole) -> Ints:
@@ -113,41 +113,6 @@ def _proved(problem: Problem, found: Whole) -> Ints:
         found.put(one, sums)
         problem.events.take(single.events, one)
     return everybody[:0]
-
-
-def one_by_one(problem: Problem) -> Sums:
-    """The sums with each direction by itself: what runs along one variable may not move in it. A member is looked at in
-    those that move something of it, and in the first one."""
-    machine, parts = problem.machine, list[Sums]()
-    for d in range(machine.directions):
-        env = {n: one_direction(v, d) for n, v in problem.env.items()}
-        moved = np.nonzero(_moved(env.values(), problem.batch))[0] if parts else np.arange(problem.batch)
-        own = problem.at(env, machine=machine.with_directions(1), outermost=True)
-        if moved.size == problem.batch:
-            parts.append(own.solver(own))
-            continue
-        resting = _resting(parts[0])
-        if moved.size:
-            with own.among(moved) as part:
-                resting = resting.with_members(moved, part.solver(part))
-            problem.events.take(part.events, moved)
-        parts.append(resting)
-    t, et = (np.concatenate([getattr(part, name) for part in parts], axis=1) for name in ("t", "et"))
-    return Sums(parts[0].v, parts[0].e, t, et)
-
-
-def _resting(sums: Sums) -> Sums:
-    """The same values, which do not change where there are any."""
-    known = np.isfinite(sums.v)[:, None]
-    return Sums(sums.v.copy(), sums.e.copy(), np.where(known, 0.0, np.nan), np.where(known, 0.0, np.inf))
-
-
-def _moved(values: Iterable[Value], size: int) -> Bools:
-    """The members of which something moves in the only direction."""
-    found = np.zeros(size, dtype=bool)
-    for cell in (cell for value in values for cell in moving(value, 0)):
-        found |= np.asarray(cell.t[0]) != 0
-    return found
 
 
 def _together(problem: Problem, todo: Ints, settled: Settled, found: Whole) -> list[Ints]:
@@ -189,7 +154,7 @@ def _together(problem: Problem, todo: Ints, settled: Settled, found: Whole) -> l
     if problem.machine.directions < 2 or todo.size <= _singly(problem):
         return [*alone, todo]
     with problem.among(todo) as here:
-        found.put(todo, one_by_one(here))
+        found.put(todo, by_directions(here))
     problem.events.take(here.events, todo)
     return alone
 

@@ -30,8 +30,9 @@ from potto.runtime.integration.at_kinks import at_kinks
 from potto.runtime.integration.attempts import Attempt, accurate, attempted, best, proved_beforehand, uncertainty
 from potto.runtime.integration.choices import many, passes_on, preferred, to_be_seen, too_many, trial, worth_trials
 from potto.runtime.integration.differences import by_differences
+from potto.runtime.integration.directions import by_directions
 from potto.runtime.integration.elimination import ACCURATE, WORTH, eliminated, step_by_step
-from potto.runtime.integration.members import by_members, one_by_one
+from potto.runtime.integration.members import by_members
 from potto.runtime.integration.one_sided import at_folds, beside_axes, on_both_sides
 from potto.runtime.integration.problem import Problem
 from potto.runtime.integration.second_looks import beside_another, by_less, in_another_order
@@ -181,7 +182,7 @@ def _along_axes(problem: Problem, plan: Plan, sums: Sums) -> Sums:
     """Surfaces run along every variable: each direction by itself, or beside the parameters."""
     machine, events = problem.machine, problem.events
     if problem.outermost and machine.directions > 1:
-        return one_by_one(problem)
+        return by_directions(problem)
     if problem.outermost:
         variable = min(event.variable for event, _ in events.every(Degenerate))
         resting = {n: still(v) for n, v in problem.env.items()}
