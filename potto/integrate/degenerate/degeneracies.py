@@ -154,7 +154,7 @@ def brush(scene: Scene, cuts: Cuts) -> None:
         owner, x = owner[counts], x[counts]
         if not owner.size or _bends(scene, owner, x, upper):
             continue
-        _, inner = around(scene.level, owner, x, not upper, scene.env, scene.sides, scene.machine)
+        _, (inner,) = around(scene.level, owner, x, (not upper,), scene.env, scene.sides, scene.machine)
         aside = np.array(BESIDE)[:, None] * (1 + np.abs(x))
         places = np.concatenate([x + sign * a for a in aside for sign in (1.0, -1.0)])
         many = 2 * len(BESIDE)

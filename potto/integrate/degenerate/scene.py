@@ -62,8 +62,8 @@ class Scene(Struct, frozen=True):
         which it only touches 0 not at all. room: (B,) how far it is to the next cut.
         """
         hidden: dict[int, Bools] = {}
-        here, inner = around(self.level, owner, x, above, self.env, self.sides, self.machine, room, hidden)
-        _, beyond = around(self.level, owner, x, not above, self.env, self.sides, self.machine, room)
+        ways, machine = (above, not above), self.machine
+        here, (inner, beyond) = around(self.level, owner, x, ways, self.env, self.sides, machine, room, hidden)
         groups = [group_of(self.level, cut) for cut in cuts]
         rows, which = _apart_from_one_another(turned)
         found = []
@@ -145,30 +145,39 @@ def _apart_from_one_another(turned: Bools) -> tuple[Bools, Ints]:
 
 
 def around(
-    level: LevelPlan, owner: Ints, x: Array, above: bool, env: dict[str, Value], sides: dict[int, Mask],
+    level: LevelPlan, owner: Ints, x: Array, ways: Sequence[bool], env: dict[str, Value], sides: dict[int, Mask],
     machine: Evaluator, room: Array | None = None, hidden: dict[int, Bools] | None = None,
-) -> tuple[dict[str, Value], dict[int, Mask]]:  # fmt: skip
-    """The environment of some members at x, and the sides of all surfaces just above or just below it.
+) -> tuple[dict[str, Value], list[dict[int, Mask]]]:  # fmt: skip
+    """The environment of some members at x, and the sides of all surfaces beside it, for each of the ways: just above
+    it, or just below.
 
-    room: how far it is to where they change. hidden: takes, by group, for whom rounding hides the side.
+    room: how far it is to where they change. hidden: takes, by group, for whom rounding hides the side that is asked
+    for first.
     """
     here, inner = placed(level, owner, x, env, sides)
     if not level.decided:
-        return here, inner
+        return here, [inner for _ in ways]
     size = 1 + np.abs(x)
-    step = (BESIDE * size if room is None else np.minimum(BESIDE * size, 0.5 * room)) * (1 if above else -1)
+    reach = BESIDE * size if room is None else np.minimum(BESIDE * size, 0.5 * room)
     # The part of how they change up to there that the rounding of the place itself comes to.
-    misplaced = CLEAR * EPS * size / np.abs(step)
-    along = machine.with_directions(1)
-    at, beside = (_with_slopes(level, {**here, level.variable: Cell(place, None, (1.0,))}, owner.size, along)
-                  for place in (x, x + step))  # fmt: skip
-    up = []
-    for group, (v, e, slope), (w, off, _) in zip(level.decided, at, beside, strict=True):
-        if hidden is not None and (there := (e > 0) & (np.abs(v) <= CLEAR * e) & (np.abs(w) <= CLEAR * off)).any():
-            hidden[group] = there
-        there = np.where((np.abs(w) > CLEAR * off) | (slope == 0), w, slope * step)  # what is steep further out is flat
-        up.append(np.where(np.abs(v) > CLEAR * e + misplaced * np.abs(w - v), v, there) >= 0)
-    return here, decided(level, inner, up)
+    misplaced = CLEAR * EPS * size / reach
+
+    def at(place: Array) -> list[tuple[Array, Array, Array]]:
+        there = {**here, level.variable: Cell(place, None, (1.0,))}
+        return _with_slopes(level, there, owner.size, machine.with_directions(1))
+
+    on, beside = at(x), list[dict[int, Mask]]()
+    for way, step in enumerate(reach if above else -reach for above in ways):
+        up = []
+        for group, (v, e, slope), (w, off, _) in zip(level.decided, on, at(x + step), strict=True):
+            unseen = (e > 0) & (np.abs(v) <= CLEAR * e) & (np.abs(w) <= CLEAR * off)
+            if hidden is not None and way == 0 and unseen.any():
+                hidden[group] = unseen
+            seen = (np.abs(w) > CLEAR * off) | (slope == 0)  # what is steep further out is flat
+            there = np.where(seen, w, slope * step)
+            up.append(np.where(np.abs(v) > CLEAR * e + misplaced * np.abs(w - v), v, there) >= 0)
+        beside.append(decided(level, inner, up))
+    return here, beside
 
 
 def placed(
