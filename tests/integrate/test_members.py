@@ -220,6 +220,18 @@ def f(px, py, r) integral ([px, px + 1/4], [py, py + 1/4]) [(x - 1/2)^2 + 2*(y -
     assert found.tangent.tolist() == [slope(*map(float, at), 0.125).tangent for at in zip(x, y, strict=True)]
 
 
+def test_members_along_every_axis_are_looked_at_in_all_directions_together(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Triangles whose edges lie on those of pixels, by six numbers: all directions are one batch, and both sides of a
+    bound one pass, so that there are eight (27 by one direction and side at a time)."""
+    rows, calls, whole = mesh("axes", 120), [], Iteration.whole
+    columns = dict(zip(NAMES, rows.T, strict=True))
+    monkeypatch.setattr(Iteration, "whole", lambda *args: calls.append(args[2]) or whole(*args))
+    answer = potto.grad(MODULE.covered, WRT)(**columns)
+    assert answer.converged and 0 < len(calls) <= 10
+    exact = np.array([area(row) for row in rows])
+    assert (np.abs(answer.value - exact) <= answer.error + 1e-17).all()
+
+
 def test_places_of_folds_go_with_their_members() -> None:
     """Also of members that are named out of order, or twice; the first to name one says where it is."""
     cause, met = TwoSided("x", fold=True), Events()

@@ -21,10 +21,20 @@ from potto.core.terms import Integral
 from potto.integrate.decomposition.cuts import frame_rows
 from potto.integrate.decomposition.meetings import Row
 from potto.integrate.decomposition.sections import searched_rows
-from potto.integrate.events import BOUNDLESS, INNER, Degenerate, Fold, OneSidedDerivatives, Shortfall, Spot, TwoSided
+from potto.integrate.events import (
+    BOUNDLESS,
+    INNER,
+    Degenerate,
+    Events,
+    Fold,
+    OneSidedDerivatives,
+    Shortfall,
+    Spot,
+    TwoSided,
+)
 from potto.integrate.pieces import Sums, gather, still
 from potto.integrate.plan import Plan
-from potto.kernels.cells import Array, Bools, Cell, Ints
+from potto.kernels.cells import Array, Bools, Cell, Ints, map_cells, pad
 from potto.runtime.evaluation.beside import (
     APART,
     NEARER,
@@ -62,7 +72,7 @@ def on_both_sides(problem: Problem, order: Integral, sums: Sums) -> Sums:
     problem.events.forget(TwoSided)
     if all(cause.hidden for cause, _ in causes) and accurate(sums, max(GAP, machine.rtol), machine):
         return sums  # what hardly counts, as at a few nodes of a variable further out
-    sides = [_one_side(problem, order, side) for side in (-1, 1)]
+    sides = _either_side(problem, order)
     backward, forward = (np.where(np.isfinite(part.et), part.t, np.nan) for part in sides)
     before, beyond = (np.where(np.isfinite(part.et), part.et, 0.0) for part in sides)
     same = np.abs(forward - backward) <= 1e-12 * (np.abs(forward) + np.abs(backward))
@@ -82,19 +92,39 @@ def on_both_sides(problem: Problem, order: Integral, sums: Sums) -> Sums:
     return replace(sums, t=t, et=et)
 
 
-def _one_side(problem: Problem, order: Integral, side: int) -> Sums:
-    """The derivatives to one side. Where surfaces are steep in the variable that is innermost rounding leaves them few
-    digits, so other orders of the variables are tried."""
-    machine = problem.machine.apart().changed(side=side)
-    found = iterated(problem.plan(order), machine, problem.env, problem.batch)
+def _either_side(problem: Problem, order: Integral) -> list[Sums]:
+    """The derivatives to both sides, backward and forward. Where surfaces are steep in the variable that is innermost
+    rounding leaves them few digits, so other orders of the variables are tried.
+
+    Backward is forward in the opposite direction, so that both are found at once.
+    """
+    k = problem.machine.directions
+    ahead = problem.machine.with_directions(2 * k).changed(side=1)
+    env = {name: map_cells(pad(value, k), _both_ways) for name, value in problem.env.items()}
+
+    def found_in(own: Integral) -> tuple[list[Sums], Events]:
+        both = problem.at(env, machine=ahead.apart())
+        found = iterated(both.plan(own), both.machine, both.env, both.batch)
+        halves = ((0.0 - found.t[:, k:], found.et[:, k:]), (found.t[:, :k], found.et[:, :k]))
+        return [Sums(found.v, found.e, *half) for half in halves], both.events
+
+    sides, _ = found_in(order)
     for other in itertools.islice(orders(order), 1, None):
-        if (found.et <= ROUGH * np.abs(found.t) + ROUNDED * found.e[:, None]).all() or machine.exhausted():
+        if all(map(_sharp, sides)) or ahead.exhausted():
             break
-        apart = machine.apart().changed(side=side)
-        part = iterated(problem.plan(other), apart, problem.env, problem.batch)
-        if (part.et <= found.et).all() and not apart.events.touched(problem.batch).any():
-            found = part
-    return found
+        parts, events = found_in(other)
+        if not events.touched(problem.batch).any():
+            sides = [part if (part.et <= own.et).all() else own for own, part in zip(sides, parts, strict=True)]
+    return sides
+
+
+def _sharp(sums: Sums) -> bool:
+    return bool((sums.et <= ROUGH * np.abs(sums.t) + ROUNDED * sums.e[:, None]).all())
+
+
+def _both_ways(cell: Cell) -> Cell:
+    """A number as it moves in each direction, and in each opposite one."""
+    return Cell(cell.v, cell.e, (*cell.t, *(None if t is None else -t for t in cell.t)), (*cell.et, *cell.et))
 
 
 def at_folds(problem: Problem, order: Integral, sums: Sums) -> Sums:
