@@ -183,3 +183,18 @@ def test_the_command_line_says_so(tmp_path: Any) -> None:
     assert answer["tangent"] == "inf" and answer["converged"] is False and "infinite" in answer["reasons"][0]
     shown = subprocess.run(run, capture_output=True, text=True, check=False)
     assert "inf" in shown.stdout and "infinite" in shown.stderr
+
+
+def test_a_sum_whose_terms_do_not_all_move_or_count_is_as_accurate_as_its_largest() -> None:
+    """Of [0, 1], [1, 2] and [2, 3] the first is below t/x, the others are beyond: 1, and no edge to move. Terms that
+    cancel leave rounding, which is measured by them, not by the one that is 0."""
+    m = potto.compile("""
+def f(xs: [n] Real, t) sum i in 0..n-1 (integral [i, i+1] [xs[i]*u < t] d(u))
+def g(xs: [n] Real, t) sum i in 0..n-1 (integral [0, 1] xs[i]*sin(3*u + t)^2*[u < 0.7] d(u))
+""")
+    found = potto.grad(m.f, "t")(np.array([0.3, 0.7, 0.45]), 0.4)
+    assert (found.value, found.tangent, found.converged) == (1, 0, True)
+    batch = potto.grad(m.f, "t")(np.array([0.3, 0.7, 0.45]), np.array([0.4, 0.41]))
+    assert batch.converged and batch.tangent.tolist() == [0, 0]
+    cancelled = m.g(np.array([1.0, -1.0, 0.0]), 0.2)
+    assert abs(cancelled.value) <= cancelled.error < 1e-12 and cancelled.converged
