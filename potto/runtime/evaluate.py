@@ -22,7 +22,15 @@ from potto.kernels import errors
 from potto.kernels.cells import Cell, Number, Rows, Value, all_cells
 from potto.kernels.making import counts
 from potto.projects.settings import DEFAULTS, Settings
-from potto.runtime.answers.convergence import CANCELS, Shortfalls, converged_members, members_of, merged, missed
+from potto.runtime.answers.convergence import (
+    CANCELS,
+    Shortfalls,
+    converged_members,
+    members_of,
+    merged,
+    missed,
+    steep,
+)
 from potto.runtime.answers.estimate import Estimate, OneSided
 from potto.runtime.answers.inherited_errors import rough, widened
 from potto.runtime.evaluation.arrays import array, element, length
@@ -211,6 +219,7 @@ def report(value: Value, machine: Machine, clock: Clock) -> Estimate:
     shown = _flat(numbers, told(value, lambda cell: cell.e))  # nan of nan is another reason than inf of nan
     slopes = _slopes(value)
     missing = _missing([*shown, *slopes], machine)
+    merged(missing, steep([slope for slope, _ in slopes], missing))
     shape = np.broadcast_shapes(*(number.shape for number, _ in shown if isinstance(number, np.ndarray)))
     return answer(
         numbers, bounds, tangents, tangent_bounds, converged=not missing,

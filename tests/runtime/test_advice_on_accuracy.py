@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 
 import mpmath
+import numpy as np
 import pytest
 
 import potto
@@ -57,3 +58,16 @@ def test_what_is_proposed() -> None:
     assert attainable((2.0, 4.0), (1e-5, 1e-4)) == 2e-4 and attainable((2.0, 4.0), (0.0, 1e-4)) == 2e-4
     assert attainable(0.0, 1e-5) is None and attainable(1.0, 0.5) is None and attainable(1.0, float("nan")) is None
     assert attainable(2.0, 0.0) is None and attainable((2.0, 0.0), (1e-5, 1e-5)) is None
+
+
+def test_an_infinite_derivative_has_converged_to_nothing() -> None:
+    """sqrt rises infinitely at 0: asked for in whatever form, alone, beside other numbers or in a batch."""
+    root = potto.compile("def f(x) sqrt(x)\n").f
+    both = potto.compile("def f(x, y) (y^2, sqrt(x))\n").f
+    at, dual = np.array([0.0, 4.0]), (np.array([0.0, 4.0]), 1.0)
+    for one in (potto.grad(root)(0.0), potto.deriv(root)((0.0, 1.0)), potto.deriv(both)((0.0, 1.0), (1.0, 0.0))):
+        assert not one.converged
+        assert [why.message for why in one.shortfalls] == ["the derivative is infinite here"]
+    for many in (potto.grad(root)(at), potto.deriv(root)(dual)):
+        assert many.member_converged.tolist() == [False, True]
+    assert potto.grad(root)(4.0).converged

@@ -11,7 +11,7 @@ absolute bound.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
 from typing import Any
 
@@ -26,6 +26,7 @@ from potto.integrate.events import (
     NO_VALUE,
     NOT_A_NUMBER,
     ROUNDED,
+    STEEP,
     TOO_FEW,
     TOO_LARGE,
     UNBOUNDED_SAMPLES,
@@ -209,6 +210,16 @@ def _told(v: Array, e: Array, drawn: bool) -> Sequence[tuple[Shortfall, Any]]:
         (ROUNDED, rounded),
         (TOO_LARGE, np.full(v.shape, True)),
     )
+
+
+def steep(slopes: Iterable[Any], known: Mapping[Shortfall, Any]) -> Shortfalls:
+    """Where derivatives are infinite: they have converged to nothing. Of an infinite integral more is `known`."""
+    found: Shortfalls = {}
+    if INFINITE not in known:
+        for slope in slopes:
+            if np.any(where := np.isinf(slope)):
+                merged(found, {STEEP: where})
+    return found
 
 
 def merged(into: Shortfalls, more: Mapping[Shortfall, Any]) -> None:

@@ -15,6 +15,7 @@ from msgspec.structs import replace
 
 from potto.core.terms import App, Deriv, Global, If, Lam, Term, Var
 from potto.kernels.cells import Cell, Rows, Value
+from potto.runtime.answers.convergence import converged_members, steep
 from potto.runtime.answers.estimate import Estimate
 from potto.runtime.answers.named import Named, has_records, named
 from potto.runtime.answers.printing import (
@@ -180,4 +181,17 @@ def as_dual(estimate: Estimate) -> Estimate:
     if _has_functions(estimate.value):
         return estimate
     (value, tangent), (error, tangent_error) = estimate.value, estimate.error
-    return replace(estimate, value=value, error=error, tangent=tangent, tangent_error=tangent_error)
+    dual = replace(estimate, value=value, error=error, tangent=tangent, tangent_error=tangent_error)
+    missing = steep(_numbers(tangent), estimate.shortfalls)
+    if not missing:
+        return dual
+    every = estimate.member_converged
+    return replace(
+        dual, converged=False, shortfalls={**estimate.shortfalls, **missing},
+        member_converged=None if every is None else every & converged_members(missing, np.shape(every)),
+    )  # fmt: skip
+
+
+def _numbers(value: Any) -> list[Any]:
+    """The numbers of a value of tuples and lists, or arrays of them."""
+    return [number for item in value for number in _numbers(item)] if isinstance(value, tuple | list) else [value]

@@ -15,6 +15,7 @@ import numpy as np
 from msgspec.structs import replace
 
 from potto.core.terms import Integral
+from potto.integrate.columns import run_of
 from potto.integrate.events import Degenerate, Events, Fold, Shortfall, TwoSided, Unsearched
 from potto.integrate.pieces import Sums
 from potto.kernels.cells import Array, Bools, Ints
@@ -53,8 +54,8 @@ class Whole:
 
     @property
     def sums(self) -> Sums:
-        if len(self.parts) == 1:  # all of them, in order
-            (_, part), *_ = self.parts
+        index, part = self.parts[0]
+        if len(self.parts) == 1 and (index.size == 1 or run_of(index) is not None):  # all of them, in order
             return replace(part, gross=added_up(part))
         order = np.argsort(np.concatenate([index for index, _ in self.parts]))
         return Sums.joined([replace(part, gross=added_up(part)) for _, part in self.parts]).pick(order)
