@@ -1,6 +1,6 @@
 """The server's side of the evaluation process, which is started when first needed and given one task at a time.
 
-Owns `Evaluator` and `EvaluationTask`. A task has limits of time and memory and can be cancelled: the process is
+Owns `EvaluationQueue` and `EvaluationTask`. A task has limits of time and memory and can be cancelled: the process is
 interrupted, and killed if it doesn't react. If it dies, the next task starts a new one.
 """
 
@@ -53,7 +53,7 @@ class GivesWay(Exception):
     """A task was stopped for a more urgent one."""
 
 
-class Evaluator:
+class EvaluationQueue:
     """The queue of tasks, and the process that carries them out."""
 
     def __init__(self, analysis: Analysis) -> None:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from potto.query import Database
     from potto.reports.render import Located
     from potto_lsp.analysis import Analysis
-    from potto_lsp.evaluation import Evaluator
+    from potto_lsp.evaluation import EvaluationQueue
     from potto_lsp.features.colours import Colours
     from potto_lsp.live import LiveValues
     from potto_lsp.publishing import Publisher
@@ -34,7 +34,7 @@ class ClientSession:
 
     analysis: Analysis
     publisher: Publisher
-    evaluator: Evaluator
+    evaluator: EvaluationQueue
 
     def __init__(
         self,
@@ -58,13 +58,13 @@ class ClientSession:
         """Load what the work needs. Runs on the thread that will own the database, after the greeting."""
         with memory.loading():
             from potto_lsp.analysis import Analysis
-            from potto_lsp.evaluation import Evaluator
+            from potto_lsp.evaluation import EvaluationQueue
             from potto_lsp.publishing import Publisher
 
             self.analysis = Analysis(self.client.encoding)
             self.analysis.settings = settings_of(self.client.options)
             self.publisher = Publisher(self.analysis, self.client, self.notify)
-            self.evaluator = Evaluator(self.analysis)
+            self.evaluator = EvaluationQueue(self.analysis)
             self.publisher.further = self._of_values
             self.set_folders(self.client.folders)
         return self.analysis.db

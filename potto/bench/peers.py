@@ -166,7 +166,7 @@ class Vegas(Values):
         return MethodAnswer(float(found.mean), count, float(found.sdev))
 
 
-class Sum:
+class MeanOfCells:
     """The mean over the middles of equal cells, differentiated as it stands: the interior, without the boundary.
 
     Differentiated by a complex step, which is as exact as automatic differentiation and gives the same numbers.
@@ -245,4 +245,4 @@ def cells(problem: BenchProblem, points: float) -> tuple[tuple[Any, ...], int]:
     return tuple(axis.reshape([-1 if i == j else 1 for j in range(d)]) for i, axis in enumerate(axes)), n**d
 
 
-PEERS = (Quad(), Nquad(), Cubature(), QmcQuad(), Vegas(), Sum(), Jax())
+PEERS = (Quad(), Nquad(), Cubature(), QmcQuad(), Vegas(), MeanOfCells(), Jax())

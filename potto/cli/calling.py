@@ -45,11 +45,11 @@ def _only(whole: str, path: str) -> str:
     from pathlib import Path
 
     from potto.data.files import read, shape_of
-    from potto.data.values import Columns
+    from potto.data.values import RecordColumns
 
     content = read(Path(path))
     shape = shape_of(Path(path), content) if isinstance(content, bytes) else None
-    return f"({whole}).{shape.fields[0][0]}" if isinstance(shape, Columns) and len(shape.fields) == 1 else whole
+    return f"({whole}).{shape.fields[0][0]}" if isinstance(shape, RecordColumns) and len(shape.fields) == 1 else whole
 
 
 def add_set(parser: argparse.ArgumentParser) -> None:

@@ -15,7 +15,18 @@ _HOMES = {
     "display": ("summary", "thumbnail"),
     "files": ("SUFFIXES", "digest", "read", "shape_of", "suggest", "values_of"),
     "mistakes": ("TITLES", "DataMistake"),
-    "values": ("Array", "Columns", "Item", "Number", "NumberRow", "Shape", "Sizes", "Table", "Value", "shape"),
+    "values": (
+        "Item",
+        "NumberArray",
+        "NumberRow",
+        "RealNumber",
+        "RecordColumns",
+        "Shape",
+        "Sizes",
+        "Table",
+        "Value",
+        "shape",
+    ),
 }
 _HOME = {name: home for home, names in _HOMES.items() for name in names}
 

@@ -18,7 +18,7 @@ from msgspec import Struct
 
 from potto.data.mistakes import DataRefused, bad_row, counted, malformed, quoted
 from potto.data.texts import identifiers
-from potto.data.values import DEEPEST, Array, Columns, Number, Sizes, Table
+from potto.data.values import DEEPEST, NumberArray, RealNumber, RecordColumns, Sizes, Table
 
 if TYPE_CHECKING:
     from zipfile import ZipFile, ZipInfo
@@ -65,7 +65,7 @@ class _Head(Struct, frozen=True):
         return bool(self.parts[0].name)
 
 
-def array_head(content: bytes) -> Number | Sizes | Columns | None:
+def array_head(content: bytes) -> RealNumber | Sizes | RecordColumns | None:
     """The shape of an NPY file; None where its numbers have to be looked at."""
     head = _checked(content, len(content))
     if not _surely_finite(head, content):
@@ -74,10 +74,10 @@ def array_head(content: bytes) -> Number | Sizes | Columns | None:
         return _shape(head.dimensions)
     names = identifiers([part.name for part in head.parts])
     shapes = (_shape((*head.dimensions, *part.dimensions)) for part in head.parts)
-    return Columns(tuple(zip(names, shapes)))
+    return RecordColumns(tuple(zip(names, shapes)))
 
 
-def array_file(content: bytes) -> float | Array | Table:
+def array_file(content: bytes) -> float | NumberArray | Table:
     """The value of an NPY file."""
     head = _checked(content, len(content))
     if not head.named:
@@ -86,23 +86,23 @@ def array_file(content: bytes) -> float | Array | Table:
     return Table(tuple((name, _array(head, content, part.name)) for name, part in zip(names, head.parts)))
 
 
-def table_head(content: bytes) -> Columns | None:
+def table_head(content: bytes) -> RecordColumns | None:
     """The shape of an NPZ file; None where its numbers have to be looked at."""
 
-    def head(archive: ZipFile, entry: ZipInfo) -> Number | Sizes | None:
+    def head(archive: ZipFile, entry: ZipInfo) -> RealNumber | Sizes | None:
         found = archive.read(entry)
         known = _without_names(_checked(found, len(found)))
         return _shape(known.dimensions) if _surely_finite(known, found) else None
 
     fields = tuple(_entries(content, head))
     finite = tuple((name, shape) for name, shape in fields if shape is not None)
-    return Columns(finite) if len(finite) == len(fields) else None
+    return RecordColumns(finite) if len(finite) == len(fields) else None
 
 
 def table_file(content: bytes) -> Table:
     """The value of an NPZ file."""
 
-    def value(archive: ZipFile, entry: ZipInfo) -> float | Array:
+    def value(archive: ZipFile, entry: ZipInfo) -> float | NumberArray:
         found = archive.read(entry)
         return _array(_without_names(_checked(found, len(found))), found)
 
@@ -240,11 +240,11 @@ def _pickled() -> DataRefused:
     return malformed(message, found="pickle", hint=_SAVE)
 
 
-def _shape(dimensions: tuple[int, ...]) -> Number | Sizes:
-    return Sizes(dimensions) if dimensions else Number()
+def _shape(dimensions: tuple[int, ...]) -> RealNumber | Sizes:
+    return Sizes(dimensions) if dimensions else RealNumber()
 
 
-def _array(head: _Head, content: bytes, name: str = "") -> float | Array:
+def _array(head: _Head, content: bytes, name: str = "") -> float | NumberArray:
     """The numbers of a file, or those that its elements hold under a name."""
     import numpy as np
 
@@ -263,7 +263,7 @@ def _array(head: _Head, content: bytes, name: str = "") -> float | Array:
         at = np.argwhere(~np.isfinite(found.reshape(shaped.shape)))[0].tolist() if shaped.shape else []
         refused = _infinite(tuple(at), str(found.reshape(shaped.shape)[tuple(at)]))
         raise _within(name, refused) if name else refused
-    return Array(shaped.shape, Number(), found) if shaped.shape else float(found.reshape(()))
+    return NumberArray(shaped.shape, RealNumber(), found) if shaped.shape else float(found.reshape(()))
 
 
 def _infinite(at: tuple[int, ...], found: str) -> DataRefused:

@@ -9,7 +9,7 @@ import struct
 import zlib
 from typing import TYPE_CHECKING
 
-from potto.data.values import Array, Number, NumberRow, Table, Value
+from potto.data.values import NumberArray, NumberRow, RealNumber, Table, Value
 
 if TYPE_CHECKING:
     import numpy as np
@@ -31,7 +31,7 @@ def summary(value: Value) -> str:
         more = len(value.fields) - len(shown)
         left_out = [f"without {', '.join(value.texts)}: no numbers"] if value.texts else []
         return "; ".join([*shown, *([f"and {more} more"] if more else []), *left_out])
-    if not isinstance(value, Array):
+    if not isinstance(value, NumberArray):
         return _short(value)
     length = value.item.length if isinstance(value.item, NumberRow) else 1
     lines = value.values.reshape(-1, length)
@@ -90,7 +90,11 @@ def thumbnail(value: Value) -> bytes | None:
     """
     import numpy as np
 
-    if not isinstance(value, Array) or len(value.dimensions) != 2 or value.item not in (Number(), NumberRow(3)):
+    if (
+        not isinstance(value, NumberArray)
+        or len(value.dimensions) != 2
+        or value.item not in (RealNumber(), NumberRow(3))
+    ):
         return None
     light = value.values.reshape(*value.dimensions, -1)
     scale = float(np.abs(light).max()) or 1.0

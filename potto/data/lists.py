@@ -21,7 +21,7 @@ from msgspec import Struct
 
 from potto.data.mistakes import MALFORMED, DataMistake, DataRefused, bad_row, counted, malformed, quoted
 from potto.data.texts import identifiers
-from potto.data.values import DEEPEST, Array, Number, Table, Value
+from potto.data.values import DEEPEST, NumberArray, RealNumber, Table, Value
 
 Path = tuple[str | int, ...]
 
@@ -116,7 +116,7 @@ def _value(box: _Box) -> Value:
         at = next(at for at, number in enumerate(numbers) if not isfinite(number))
         hint = "a number is at most 1.8e308; leave out what has no value"
         raise _at(box, box.place(at), f"{numbers[at]} is not finite", str(numbers[at]), "a number", hint)
-    return Array(box.dimensions, Number(), array("d", numbers)) if box.dimensions else float(numbers[0])
+    return NumberArray(box.dimensions, RealNumber(), array("d", numbers)) if box.dimensions else float(numbers[0])
 
 
 def _opened(box: _Box) -> _Box:

@@ -16,7 +16,7 @@ from msgspec import Struct
 
 from potto.data.mistakes import NO_PACKAGE, DataMistake, DataRefused, malformed
 from potto.data.scanlines import CHANNELS, deep, is_sound
-from potto.data.values import Array, Item, Number, NumberRow, Sizes
+from potto.data.values import Item, NumberArray, NumberRow, RealNumber, Sizes
 from potto.extras import install_command
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ class _Head(Struct, frozen=True):
 
     @property
     def item(self) -> Item:
-        return NumberRow(3) if self.coloured else Number()
+        return NumberRow(3) if self.coloured else RealNumber()
 
 
 def picture_head(content: bytes) -> Sizes | None:
@@ -53,11 +53,11 @@ def picture_head(content: bytes) -> Sizes | None:
     return Sizes((head.height, head.width), head.item) if head.sound else None
 
 
-def picture(content: bytes) -> Array:
+def picture(content: bytes) -> NumberArray:
     """The pixels of a picture, row by row from the top."""
     head = _head(content)
     numbers = _pixels(content, head) if head.deep is None else _deep(content, head, head.deep)
-    return Array((head.height, head.width), head.item, numbers)
+    return NumberArray((head.height, head.width), head.item, numbers)
 
 
 def _head(content: bytes) -> _Head:

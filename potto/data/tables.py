@@ -17,7 +17,7 @@ from msgspec import Struct
 
 from potto.data.mistakes import DataRefused, bad_row, counted, malformed, quoted
 from potto.data.texts import identifiers
-from potto.data.values import Array, Number, Table
+from potto.data.values import NumberArray, RealNumber, Table
 
 WHITE = " "  # any blanks and tabs
 DELIMITERS = ("\t", ";", "|", ",", WHITE)  # between equals the earlier one
@@ -45,7 +45,7 @@ class _Layout(Struct, frozen=True):
         return f"column {quoted(name)}" if name else f"column {at + 1}"
 
 
-def separated(text: str, tabs: bool) -> Array | Table:
+def separated(text: str, tabs: bool) -> NumberArray | Table:
     """What a table holds: named columns below a header, otherwise one array. `tabs`: nothing else separates."""
     lines = text.split("\n")
     delimiter = "\t" if tabs else _delimiter(lines)
@@ -66,20 +66,24 @@ def separated(text: str, tabs: bool) -> Array | Table:
     return _value(layout, columns, texts)
 
 
-def _value(layout: _Layout, columns: Sequence[array[float]], texts: frozenset[int]) -> Array | Table:
+def _value(layout: _Layout, columns: Sequence[array[float]], texts: frozenset[int]) -> NumberArray | Table:
     length = max(map(len, columns))
     if not length:
         raise malformed("the file has a header and no rows", hint="a table has numbers in rows below its header")
     if layout.names:
         names = identifiers(layout.names)
-        kept = ((name, Array((length,), Number(), columns[at])) for at, name in enumerate(names) if at not in texts)
+        kept = (
+            (name, NumberArray((length,), RealNumber(), columns[at]))
+            for at, name in enumerate(names)
+            if at not in texts
+        )
         return Table(tuple(kept), tuple(names[at] for at in sorted(texts) if layout.names[at].strip()))
     if layout.width == 1:
-        return Array((length,), Number(), columns[0])
+        return NumberArray((length,), RealNumber(), columns[0])
     flat = array("d", bytes(8 * length * layout.width))
     for at, column in enumerate(columns):
         flat[at :: layout.width] = column
-    return Array((length, layout.width), Number(), flat)
+    return NumberArray((length, layout.width), RealNumber(), flat)
 
 
 def _is_idle(line: str, delimiter: str) -> bool:

@@ -1,7 +1,7 @@
 """What files of data hold: shapes, which checking asks for, and values, which evaluation asks for.
 
 Owns both and the way from a value to its shape. The numbers of an array lie in a row, the last index running fastest,
-in an `array` of the standard library or in one of numpy: only who asks for `Array.values` loads numpy.
+in an `array` of the standard library or in one of numpy: only who asks for `NumberArray.values` loads numpy.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 DEEPEST = 32  # dimensions, as every version of numpy takes them
 
 
-class Number(Struct, frozen=True):
+class RealNumber(Struct, frozen=True):
     """A real number."""
 
 
@@ -29,17 +29,17 @@ class NumberRow(Struct, frozen=True):
     length: int
 
 
-Item = Number | NumberRow
+Item = RealNumber | NumberRow
 
 
 class Sizes(Struct, frozen=True):
     """An array: how long it is in each direction, and what it is of."""
 
     dimensions: tuple[int, ...]
-    item: Item = Number()
+    item: Item = RealNumber()
 
 
-class Columns(Struct, frozen=True):
+class RecordColumns(Struct, frozen=True):
     """A record: names, which are identifiers and differ, and what stands under them. texts: the names of columns that
     were left out, since no value in them is a number."""
 
@@ -47,11 +47,11 @@ class Columns(Struct, frozen=True):
     texts: tuple[str, ...] = ()
 
 
-Shape = Number | Sizes | Columns
+Shape = RealNumber | Sizes | RecordColumns
 SEPARATOR = "."  # between the names of records within records
 
 
-class Array(Struct, frozen=True, eq=False, dict=True):
+class NumberArray(Struct, frozen=True, eq=False, dict=True):
     """Numbers, or rows of numbers, in the order in which the last index runs fastest."""
 
     dimensions: tuple[int, ...]
@@ -70,7 +70,7 @@ class Array(Struct, frozen=True, eq=False, dict=True):
     @property
     def full(self) -> tuple[int, ...]:
         """The shape of `values`."""
-        return self.dimensions if isinstance(self.item, Number) else (*self.dimensions, self.item.length)
+        return self.dimensions if isinstance(self.item, RealNumber) else (*self.dimensions, self.item.length)
 
     @property
     def size(self) -> int:
@@ -79,7 +79,7 @@ class Array(Struct, frozen=True, eq=False, dict=True):
 
 
 class Table(Struct, frozen=True, eq=False):
-    """A record of arrays, numbers and records, in the order of the file. texts: as in `Columns`."""
+    """A record of arrays, numbers and records, in the order of the file. texts: as in `RecordColumns`."""
 
     fields: tuple[tuple[str, Value], ...]
     texts: tuple[str, ...] = ()
@@ -91,18 +91,18 @@ class Table(Struct, frozen=True, eq=False):
         return found[rest] if rest and isinstance(found, Table) else found
 
 
-Value = float | Array | Table
+Value = float | NumberArray | Table
 
 
 def shape(value: Value) -> Shape:
     """The shape of a value."""
     if isinstance(value, Table):
-        return Columns(tuple((name, shape(field)) for name, field in value.fields), value.texts)
-    return Sizes(value.dimensions, value.item) if isinstance(value, Array) else Number()
+        return RecordColumns(tuple((name, shape(field)) for name, field in value.fields), value.texts)
+    return Sizes(value.dimensions, value.item) if isinstance(value, NumberArray) else RealNumber()
 
 
 def size(value: Value) -> int:
     """How many numbers a value is made of."""
     if isinstance(value, Table):
         return sum(size(field) for _, field in value.fields)
-    return value.size if isinstance(value, Array) else 1
+    return value.size if isinstance(value, NumberArray) else 1

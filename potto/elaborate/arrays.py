@@ -44,7 +44,7 @@ from potto.core.terms import (
     var,
 )
 from potto.data.mistakes import DataMistake
-from potto.data.values import SEPARATOR, Columns, Shape
+from potto.data.values import SEPARATOR, RecordColumns, Shape
 from potto.elaborate.context import Elaboration, rule
 from potto.elaborate.shapes import is_vector
 from potto.elaborate.values import LocalNames, Value
@@ -156,7 +156,7 @@ def loaded(elaboration: Elaboration, written: str) -> Term:
 
 def _held(file: DataFile, shape: Shape, name: str) -> Term:
     """What a file of data holds under a name."""
-    if not isinstance(shape, Columns):
+    if not isinstance(shape, RecordColumns):
         return data(file.path, file.digest, name)
     return tuple_([_held(file, item, f"{name}{SEPARATOR if name else ''}{own}") for own, item in shape.fields])
 

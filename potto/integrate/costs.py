@@ -40,7 +40,7 @@ def books() -> Costs | None:
     return Costs() if wanted() else None
 
 
-class Surface(Struct):
+class SurfaceCount(Struct):
     """What became of a surface: whether it met the domain, whether it moved there, whether anyone asked if it does."""
 
     met: bool = False
@@ -76,7 +76,7 @@ class Costs(Struct):
     empty: int = 0
     whole: int = 0
     looked: int = 0
-    surfaces: dict[Term, Surface] = {}
+    surfaces: dict[Term, SurfaceCount] = {}
     _apart: int | None = None
 
     def add(self, evaluations: int) -> None:
@@ -113,7 +113,7 @@ class Costs(Struct):
 
     def saw(self, surface: Term, roots: Sequence[tuple[Any, Sequence[Any]]], lo: Any, hi: Any, asked: bool) -> None:
         """The roots of a surface over one variable with their speeds, and the bounds that they may lie between."""
-        seen = self.surfaces.setdefault(surface, Surface())
+        seen = self.surfaces.setdefault(surface, SurfaceCount())
         seen.asked = seen.asked or asked
         low, high = np.minimum(lo, hi), np.maximum(lo, hi)
         for root, speeds in roots:
@@ -123,7 +123,7 @@ class Costs(Struct):
 
     def sampled(self, surface: Term, inside: Any, speeds: Sequence[Any]) -> None:
         """The same of a surface that was sampled."""
-        seen = self.surfaces.setdefault(surface, Surface())
+        seen = self.surfaces.setdefault(surface, SurfaceCount())
         seen.asked = True
         seen.met = seen.met or bool(np.any(inside))
         seen.moves = seen.moves or any(bool(np.any(inside & (s != 0))) for s in speeds)
@@ -133,8 +133,8 @@ class Costs(Struct):
         met, self.surfaces = self.surfaces, {s: seen for s, seen in self.surfaces.items() if s in known}
         for surface, seen in met.items():
             if surface not in known:
-                before = self.surfaces.get(term := change(surface), Surface())
-                self.surfaces[term] = Surface(
+                before = self.surfaces.get(term := change(surface), SurfaceCount())
+                self.surfaces[term] = SurfaceCount(
                     before.met or seen.met, before.moves or seen.moves, before.asked or seen.asked
                 )
 

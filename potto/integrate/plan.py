@@ -47,7 +47,7 @@ from potto.core.terms import (
     with_integrand,
 )  # fmt: skip
 from potto.integrate.fixed.boxes import Box, box_of
-from potto.integrate.fixed.straight import Straight, straight
+from potto.integrate.fixed.straight import StraightIntegral, straight
 from potto.integrate.levels import Group, LevelPlan
 from potto.integrate.outline import Outline, Outlines, outlined
 from potto.kernels.cells import Mask, Trace
@@ -70,7 +70,7 @@ class Plan(Struct, frozen=True, dict=True):
     decisions: tuple[tuple[Term, float | None], ...] = ()
     reaches: bool = True
     inlined: Term | None = None
-    straight: Straight | None = None
+    straight: StraightIntegral | None = None
     premise: Lam | None = None
     confused: bool = False
     degrees: tuple[int | None, ...] = ()
@@ -126,7 +126,7 @@ class Plan(Struct, frozen=True, dict=True):
         return self.outline.steps
 
     @cached_property
-    def line(self) -> Straight | None:
+    def line(self) -> StraightIntegral | None:
         """The integral over the innermost variable alone, those further out being parameters, where its cuts are closed
         forms."""
         *_, last = self.levels

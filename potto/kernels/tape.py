@@ -247,7 +247,7 @@ def _in_order(nodes: Iterable[Node], by_members: bool = False) -> list[Node]:
     return sorted(seen, key=lambda node: node.number)
 
 
-class Sum(Struct, frozen=True):
+class Accumulated(Struct, frozen=True):
     """What has come together so far: its value, the same along all paths without regard to sign, how far off it may
     be, and whether it is made of whole numbers, so that nothing was rounded off yet."""
 
@@ -256,18 +256,18 @@ class Sum(Struct, frozen=True):
     error: Any
     whole: bool
 
-    def __add__(self, other: Sum) -> Sum:
+    def __add__(self, other: Accumulated) -> Accumulated:
         value, size, error = self.value + other.value, self.size + other.size, self.error + other.error
         if self.whole is not other.whole:  # the others have counted what this sum rounds off
             error = error + TWICE * (self.size if self.whole else other.size)
-        return Sum(value, size, error, self.whole and other.whole)
+        return Accumulated(value, size, error, self.whole and other.whole)
 
 
 def swept(answers: Sequence[tuple[Node, Any]]) -> dict[Node, Swept]:
     """The derivatives of a sum of answers, each times a weight, by every seed, and how far off they may be."""
-    sums: dict[Node, Sum] = {}
+    sums: dict[Node, Accumulated] = {}
     for node, weight in answers:
-        _gather(sums, node, Sum(weight, abs(weight), 0.0, _is_whole(weight)))
+        _gather(sums, node, Accumulated(weight, abs(weight), 0.0, _is_whole(weight)))
     found: dict[Node, Swept] = {}
     order = _in_order([node for node, _ in answers])
     most = _largest(order, len(answers))
@@ -280,7 +280,7 @@ def swept(answers: Sequence[tuple[Node, Any]]) -> dict[Node, Swept]:
             if pull is None:
                 _gather(sums, edge.parent, _along(edge, own, most))
             else:
-                _gather(sums, edge.parent, Sum(pull(own.value), pull(own.size), pull(own.error), own.whole))
+                _gather(sums, edge.parent, Accumulated(pull(own.value), pull(own.size), pull(own.error), own.whole))
     return found
 
 
@@ -306,11 +306,11 @@ def reached(nodes: Iterable[tuple[Node, Any]]) -> dict[Node, Any]:
 
 def pushed(nodes: Sequence[Node], directions: Sequence[Node]) -> list[list[Swept]]:
     """For each node its tangents in the direction of each leaf, and how far off they may be; None where it has none."""
-    known: dict[Node, list[Sum | None]] = {}
+    known: dict[Node, list[Accumulated | None]] = {}
     order = _in_order(nodes, by_members=True)
     most = _largest(order)
     for node in order:
-        known[node] = [None if node is not leaf else Sum(1.0, 1.0, 0.0, True) for leaf in directions]
+        known[node] = [None if node is not leaf else Accumulated(1.0, 1.0, 0.0, True) for leaf in directions]
         for edge in () if node.leaf else node.edges:
             for d, tangent in enumerate(known[edge.parent]):
                 if tangent is not None:
@@ -319,17 +319,19 @@ def pushed(nodes: Sequence[Node], directions: Sequence[Node]) -> list[list[Swept
     return [[(None, None) if x is None else (x.value, x.error) for x in known[node]] for node in nodes]
 
 
-def _along(edge: Edge, x: Sum, most: float) -> Sum:
+def _along(edge: Edge, x: Accumulated, most: float) -> Accumulated:
     """What comes to the other end of an edge, in either direction."""
     slope, whole = edge.slope, x.whole and edge.kept
     if slope.__class__ is float and slope == 1.0 and edge.off is None:
         whole = whole and bool(np.all(x.size <= most))
-        return Sum(x.value, x.size, x.error if whole else x.error + TWICE * x.size, whole)
+        return Accumulated(x.value, x.size, x.error if whole else x.error + TWICE * x.size, whole)
     steep = abs(slope)
     size = _times(steep, x.size)
     whole = whole and _is_whole(slope) and bool(np.all(size <= most))
     error = _times(steep, x.error) if whole else _times(steep, x.error) + TWICE * size
-    return Sum(_times(slope, x.value), size, error if edge.off is None else error + _times(edge.off, x.size), whole)
+    return Accumulated(
+        _times(slope, x.value), size, error if edge.off is None else error + _times(edge.off, x.size), whole
+    )
 
 
 def _largest(nodes: Sequence[Node], more: int = 0) -> float:
@@ -344,11 +346,11 @@ def _is_whole(x: Any) -> bool:
     return np.size(x) <= SHORT and bool(np.all(np.rint(x) == x))
 
 
-def _gather(sums: dict[Node, Sum], node: Node, part: Sum) -> None:
+def _gather(sums: dict[Node, Accumulated], node: Node, part: Accumulated) -> None:
     """Add what comes to a node: its adjoint, the same along all paths without regard to sign, and its error."""
     if node.shape or not isinstance(part.value, float):
         value, size, error = (_fitted(x, node.shape) for x in (part.value, part.size, part.error))
-        part = Sum(value, size, error, part.whole)
+        part = Accumulated(value, size, error, part.whole)
     known = sums.get(node)
     sums[node] = part if known is None else known + part
 

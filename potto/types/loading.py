@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 from potto.data.mistakes import TITLES, DataMistake
-from potto.data.values import SEPARATOR, Columns, NumberRow, Shape, Sizes
+from potto.data.values import SEPARATOR, NumberRow, RecordColumns, Shape, Sizes
 from potto.diagnostics import Diagnostic, Related, declare
 from potto.modules.data import data_file, path_of
 from potto.modules.texts import source
@@ -41,7 +41,7 @@ def loaded(inference: Inference, node: nodes.Apply) -> Type:
 def type_of(shape: Shape, path: str, name: str = "") -> Type:
     """The type of a kind of value: the columns of a table are a record's fields. name: of the record, if that is not
     the file's."""
-    if isinstance(shape, Columns):
+    if isinstance(shape, RecordColumns):
         name = name or path.replace("\\", "/").rpartition("/")[2]
         record = RecordName(path, name, tuple(field for field, _ in shape.fields), shape.texts)
         items = (type_of(item, path, f"{name}{SEPARATOR}{field}") for field, item in shape.fields)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from potto.data import Array, DataMistake, Table, shape, shape_of, values_of
+from potto.data import DataMistake, NumberArray, Table, shape, shape_of, values_of
 from potto.data.mistakes import NO_PACKAGE
 from potto.data.values import Value
 
@@ -23,9 +23,9 @@ def plain(name: str, content: bytes | str) -> Any:
 def _plain(value: Value) -> Any:
     if isinstance(value, Table):
         return {key: _plain(field) for key, field in value.fields}
-    if isinstance(value, Array):
+    if isinstance(value, NumberArray):
         assert value.values.dtype == "float64" and not value.values.flags.writeable and value.values.shape == value.full
-    return value.values.tolist() if isinstance(value, Array) else value
+    return value.values.tolist() if isinstance(value, NumberArray) else value
 
 
 def mistake(name: str, content: bytes | str) -> DataMistake:

@@ -16,7 +16,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from potto.data import Array, Columns, Number, Sizes, Table, shape, shape_of, values_of
+from potto.data import NumberArray, RealNumber, RecordColumns, Sizes, Table, shape, shape_of, values_of
 
 DTYPES = ("<f8", ">f8", "<f4", ">f2", "|b1", "|u1", "|i1", "<i2", ">i4", "<u4", "<i8", "=f8", "longdouble")
 arrays = st.sampled_from(DTYPES).flatmap(
@@ -42,7 +42,7 @@ def test_what_is_saved_is_read(array: npt.NDArray[Any], fortran: bool) -> None:
     with np.errstate(over="ignore"):
         expected = np.asarray(array, np.float64)
     assert plain("a.npy", saved(array)) == expected.tolist()
-    assert shape_of(Path("a.npy"), saved(array)) == (Sizes(array.shape) if array.shape else Number())
+    assert shape_of(Path("a.npy"), saved(array)) == (Sizes(array.shape) if array.shape else RealNumber())
 
 
 @pytest.mark.parametrize("version", [(1, 0), (2, 0), (3, 0)])
@@ -56,7 +56,7 @@ def test_numbers_are_aligned_wherever_they_start() -> None:
     head = b"{'descr': '<f8', 'fortran_order': False, 'shape': (2,)}"
     content = b"\x93NUMPY\x01\x00" + bytes([len(head), 0]) + head + np.array([1.0, 2.0]).tobytes()
     value = values_of(Path("a.npy"), content)
-    assert isinstance(value, Array) and value.values.flags.aligned and value.values.tolist() == [1, 2]
+    assert isinstance(value, NumberArray) and value.values.flags.aligned and value.values.tolist() == [1, 2]
 
 
 @given(st.dictionaries(st.sampled_from(["a", "b", "rate", "x y", "2"]), arrays, min_size=1, max_size=3), st.booleans())
@@ -70,9 +70,9 @@ def test_archives_are_columns(named: dict[str, npt.NDArray[Any]], compressed: bo
 
 def test_the_shape_of_an_archive() -> None:
     content = many(x=np.zeros((2, 3)), n=np.float64(3))
-    assert shape_of(Path("a.npz"), content) == Columns((("x", Sizes((2, 3))), ("n", Number())))
+    assert shape_of(Path("a.npz"), content) == RecordColumns((("x", Sizes((2, 3))), ("n", RealNumber())))
     table = values_of(Path("a.npz"), content)
-    assert isinstance(table, Table) and table["n"] == 3 and isinstance(table["x"], Array)
+    assert isinstance(table, Table) and table["n"] == 3 and isinstance(table["x"], NumberArray)
 
 
 class Bomb:
@@ -176,7 +176,7 @@ def test_elements_with_names_are_a_table() -> None:
     """Part by part, whatever the kinds, also where each part is several numbers."""
     array = np.array([(1, [2.5, 3.0]), (4, [5.0, 6.0])], [("x", "i2"), ("at 0", "<f4", (2,))])
     content = saved(array)
-    assert shape_of(Path("a.npy"), content) == Columns((("x", Sizes((2,))), ("at_0", Sizes((2, 2)))))
+    assert shape_of(Path("a.npy"), content) == RecordColumns((("x", Sizes((2,))), ("at_0", Sizes((2, 2)))))
     found = values_of(Path("a.npy"), content)
     assert isinstance(found, Table)
     assert [found[name].values.tolist() for name in ("x", "at_0")] == [[1, 4], [[2.5, 3], [5, 6]]]

@@ -12,14 +12,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from potto.data import Array, Item, Number, NumberRow, Table, summary, thumbnail
+from potto.data import Item, NumberArray, NumberRow, RealNumber, Table, summary, thumbnail
 
 
-def of(values: object, item: Item | None = None) -> Array:
+def of(values: object, item: Item | None = None) -> NumberArray:
     numbers = np.asarray(values, np.float64)
-    item = item or Number()
-    dimensions = numbers.shape if isinstance(item, Number) else numbers.shape[:-1]
-    return Array(dimensions, item, array("d", numbers.ravel().tolist()))
+    item = item or RealNumber()
+    dimensions = numbers.shape if isinstance(item, RealNumber) else numbers.shape[:-1]
+    return NumberArray(dimensions, item, array("d", numbers.ravel().tolist()))
 
 
 @pytest.mark.parametrize(
@@ -36,7 +36,7 @@ def of(values: object, item: Item | None = None) -> Array:
         (Table(tuple((name, 1.0) for name in "abcdef")), "a 1; b 1; c 1; d 1; and 2 more"),
     ],
 )
-def test_summaries(value: float | Array | Table, expected: str) -> None:
+def test_summaries(value: float | NumberArray | Table, expected: str) -> None:
     assert summary(value) == expected
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from data_files import mistake
 
-from potto.data import SUFFIXES, TITLES, Array, DataMistake, Number, read, shape_of, suggest, values_of
+from potto.data import SUFFIXES, TITLES, DataMistake, NumberArray, RealNumber, read, shape_of, suggest, values_of
 from potto.data.memory import Memory
 
 
@@ -93,8 +93,8 @@ def test_a_file_is_parsed_once() -> None:
     assert values_of(Path("a.tsv"), content) is not first
 
 
-def numbers(length: int) -> Array:
-    return Array((length,), Number(), array("d", bytes(8 * length)))
+def numbers(length: int) -> NumberArray:
+    return NumberArray((length,), RealNumber(), array("d", bytes(8 * length)))
 
 
 def test_what_is_kept_is_bounded() -> None:

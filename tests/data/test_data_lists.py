@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from potto.data import Table, shape_of, values_of
 from potto.data.lists import nested
 from potto.data.mistakes import DataRefused
-from potto.data.values import Array
+from potto.data.values import NumberArray
 
 reals = st.floats(allow_nan=False, allow_infinity=False)
 numbers = st.one_of(reals, st.integers(-(2**53), 2**53))
@@ -144,7 +144,7 @@ def test_numbers_are_those_that_python_reads(text: str) -> None:
     def told(value: object) -> list[float]:
         if isinstance(value, Table):
             return [number for _, item in value.fields for number in told(item)]
-        return [*value.numbers] if isinstance(value, Array) else [value]  # type: ignore[list-item]
+        return [*value.numbers] if isinstance(value, NumberArray) else [value]  # type: ignore[list-item]
 
     known = json.loads(text, parse_int=float)
     if isinstance(known, list) and isinstance(known[0], dict):

@@ -17,7 +17,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from potto.data import Array, DataMistake, Number, NumberRow, Sizes, shape, shape_of, thumbnail, values_of
+from potto.data import DataMistake, NumberArray, NumberRow, RealNumber, Sizes, shape, shape_of, thumbnail, values_of
 from potto.data.files import MEMORY
 from potto.extras import install_command
 
@@ -40,7 +40,7 @@ def light(content: bytes, name: str = "p.png") -> npt.NDArray[np.float64]:
 @given(sides.flatmap(lambda side: hnp.arrays(np.uint8, side)))
 def test_grey(pixels: npt.NDArray[np.uint8]) -> None:
     assert np.array_equal(light(written(pixels)), pixels / 255)
-    assert shape_of(Path("p.png"), written(pixels)) == Sizes(pixels.shape, Number())
+    assert shape_of(Path("p.png"), written(pixels)) == Sizes(pixels.shape, RealNumber())
 
 
 @given(sides.flatmap(lambda side: hnp.arrays(np.uint16, side)))
@@ -73,7 +73,7 @@ def test_palettes_and_bits() -> None:
     assert bits[24] == 1 and np.array_equal(light(bits), pixels[..., 0] / 255)
 
 
-@pytest.mark.parametrize(("shape", "item"), [((7, 9), Number()), ((7, 9, 3), NumberRow(3))])
+@pytest.mark.parametrize(("shape", "item"), [((7, 9), RealNumber()), ((7, 9, 3), NumberRow(3))])
 @pytest.mark.parametrize("how", [{}, {"progressive": True}, {"comment": b"x" * 300}])
 def test_jpeg(shape: tuple[int, ...], item: object, how: dict[str, Any]) -> None:
     content = written(np.full(shape, 200, np.uint8), "JPEG", quality=95, **how)
@@ -128,7 +128,7 @@ def test_what_is_said_without_pillow(monkeypatch: pytest.MonkeyPatch) -> None:
     assert (found.code, found.hint) == ("P0804", install_command("images"))
     assert shape_of(Path("p.png"), content) == Sizes((2, 3))
     monkeypatch.undo()
-    assert isinstance(values_of(Path("p.png"), content), Array)
+    assert isinstance(values_of(Path("p.png"), content), NumberArray)
 
 
 @pytest.mark.parametrize("name", ["p.png", "p.jpg"])
@@ -170,6 +170,6 @@ def test_damaged_files_are_answered(data: st.DataObject) -> None:
 @given(sides.flatmap(lambda side: hnp.arrays(np.uint8, side)) | sides.flatmap(lambda s: hnp.arrays(np.uint8, (*s, 3))))
 def test_thumbnails_of_small_pictures_are_the_pictures(pixels: npt.NDArray[np.uint8]) -> None:
     value = values_of(Path("p.png"), written(pixels))
-    assert isinstance(value, Array)
+    assert isinstance(value, NumberArray)
     small = thumbnail(value)
     assert small is not None and np.array_equal(np.asarray(Image.open(io.BytesIO(small))), pixels)

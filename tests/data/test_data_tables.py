@@ -16,7 +16,7 @@ from potto.data import DataMistake, shape_of, values_of
 from potto.data.files import MEMORY
 from potto.data.tables import separated
 from potto.data.texts import identifiers
-from potto.data.values import Array, Columns, Sizes, Table
+from potto.data.values import NumberArray, RecordColumns, Sizes, Table
 from potto.syntax.tokens import FIRST_NAME
 
 TEXTS = ["anna", "2020-01-31", "12 kg", "naïve", "a b", "x1"]
@@ -174,7 +174,7 @@ def test_a_hundred_thousand_rows_take_less_than_a_second() -> None:
     text = "t,x,y\n" + "".join(f"{at / 100},{at / 7},{-at / 3}\n" for at in range(100_000))
     MEMORY.clear()
     start = time.process_time()
-    assert shape_of(Path("t.csv"), text.encode()) == Columns(tuple((name, Sizes((100_000,))) for name in "txy"))
+    assert shape_of(Path("t.csv"), text.encode()) == RecordColumns(tuple((name, Sizes((100_000,))) for name in "txy"))
     assert time.process_time() - start < 0.5
     MEMORY.clear()
     start = time.process_time()
@@ -200,7 +200,7 @@ def test_columns_of_text_are_left_out(
     found = separated(text, delimiter == "\t")
     assert isinstance(found, Table)
     assert found.texts == ("label",)
-    assert {name: column.values.tolist() for name, column in found.fields if isinstance(column, Array)} == {
+    assert {name: column.values.tolist() for name, column in found.fields if isinstance(column, NumberArray)} == {
         name: list(column) for name, column in zip(names, zip(*rows))
     }
 

@@ -18,7 +18,7 @@ from urllib.parse import unquote, urlparse
 import pytest
 from lsp_client import Client
 from potto_lsp.analysis import Analysis
-from potto_lsp.evaluation import LIVE, EvaluationTask, Evaluator
+from potto_lsp.evaluation import LIVE, EvaluationQueue, EvaluationTask
 from potto_lsp.evaluator import _answer as answered
 
 from potto.evaluating.world import World
@@ -353,7 +353,7 @@ def test_nothing_is_evaluated_unasked_when_that_is_switched_off(server: Server, 
     assert "result" in run(client, "potto.evaluate", uri("main"), "f(0.5)")
 
 
-def ask(evaluator: Evaluator, text: str, **more: Any) -> Any:
+def ask(evaluator: EvaluationQueue, text: str, **more: Any) -> Any:
     """What an evaluator answers."""
     answers: SimpleQueue[Any] = SimpleQueue()
     evaluator.put(EvaluationTask("evaluate", "<text>", text, answers.put, **more))
@@ -362,7 +362,7 @@ def ask(evaluator: Evaluator, text: str, **more: Any) -> Any:
 
 
 def test_an_evaluation_that_dies_is_started_again() -> None:
-    evaluator = Evaluator(Analysis("utf-16"))
+    evaluator = EvaluationQueue(Analysis("utf-16"))
     assert ask(evaluator, "1 + 1") == {"text": "2"}
     assert evaluator._process is not None
     evaluator._process.kill()
@@ -371,7 +371,7 @@ def test_an_evaluation_that_dies_is_started_again() -> None:
     evaluator.close()
 
 
-def kill_at_work(evaluator: Evaluator, monkeypatch: pytest.MonkeyPatch, times: int) -> list[int]:
+def kill_at_work(evaluator: EvaluationQueue, monkeypatch: pytest.MonkeyPatch, times: int) -> list[int]:
     """End the process of an evaluator when it has been asked something, and then those that follow; their ids."""
     waits, killed = evaluator._await, list[int]()
 
@@ -387,7 +387,7 @@ def kill_at_work(evaluator: Evaluator, monkeypatch: pytest.MonkeyPatch, times: i
 
 
 def test_an_evaluation_that_dies_at_work_is_asked_once_more(monkeypatch: pytest.MonkeyPatch) -> None:
-    evaluator = Evaluator(Analysis("utf-16"))
+    evaluator = EvaluationQueue(Analysis("utf-16"))
     killed = kill_at_work(evaluator, monkeypatch, 1)
     assert ask(evaluator, "2 + 3") == {"text": "5"}
     assert len(killed) == 1
@@ -395,7 +395,7 @@ def test_an_evaluation_that_dies_at_work_is_asked_once_more(monkeypatch: pytest.
 
 
 def test_a_question_that_ends_two_processes_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
-    evaluator = Evaluator(Analysis("utf-16"))
+    evaluator = EvaluationQueue(Analysis("utf-16"))
     killed = kill_at_work(evaluator, monkeypatch, 2)
     assert "ended unexpectedly" in ask(evaluator, HEAVY)["error"]
     assert len(set(killed)) == 2
@@ -406,7 +406,7 @@ def test_a_question_that_ends_two_processes_is_given_up(monkeypatch: pytest.Monk
 @pytest.mark.parametrize("deaf", [False, True], ids=["interrupted", "killed"])
 def test_an_evaluation_that_hangs_is_ended(deaf: bool) -> None:
     """Also one that does not heed an interrupt: stopped, as a process that waits for something for ever."""
-    evaluator = Evaluator(Analysis("utf-16"))
+    evaluator = EvaluationQueue(Analysis("utf-16"))
     evaluator._analysis.settings = {"evaluation.timeLimit": 0.5}
     assert ask(evaluator, "1 + 1") == {"text": "2"}
     if deaf:
@@ -420,7 +420,7 @@ def test_an_evaluation_that_hangs_is_ended(deaf: bool) -> None:
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux holds a process to what it may allocate")
 def test_an_evaluation_that_takes_too_much_memory_is_stopped() -> None:
     """It is told so, and what is asked next is answered."""
-    evaluator = Evaluator(Analysis("utf-16"))
+    evaluator = EvaluationQueue(Analysis("utf-16"))
     assert ask(evaluator, "1 + 1") == {"text": "2"}
     evaluator._analysis.settings = {"evaluation.memoryLimit": 300}
     for _ in range(2):
@@ -433,7 +433,7 @@ def test_an_evaluation_that_takes_too_much_memory_is_stopped() -> None:
 
 def test_what_a_user_asks_for_does_not_wait_for_what_is_shown() -> None:
     """A live expression that takes long gives way and is done afterwards."""
-    evaluator = Evaluator(Analysis("utf-16"))
+    evaluator = EvaluationQueue(Analysis("utf-16"))
     evaluator._analysis.settings = {"evaluation.timeLimit": 4}
     assert ask(evaluator, "1 + 1") == {"text": "2"}
     done: list[str] = []

@@ -16,7 +16,7 @@ import pytest
 
 from potto.core.terms import Const, Prim, Term, Var, add, const, div, mul, neg, pow_, prim, sub, var
 from potto.integrate.rules.complex_enclosures import Form, enclosed
-from potto.integrate.rules.proved_orders import Cell, Region, proved, proved_of_each
+from potto.integrate.rules.proved_orders import FrameCell, Region, proved, proved_of_each
 
 OPS: dict[str, Callable[..., Any]] = {
     "add": lambda *a: sum(a[1:], a[0]),
@@ -97,7 +97,7 @@ def test_an_enclosure_holds_every_value(seed: int) -> None:
     assert checked > 25
 
 
-def integral(term: Term, cell: Cell, frames: list[list[Term]], c: float, orders: tuple[int, ...]) -> float:
+def integral(term: Term, cell: FrameCell, frames: list[list[Term]], c: float, orders: tuple[int, ...]) -> float:
     """The product rule over one cell."""
     rules = [np.polynomial.legendre.leggauss(n) for n in orders]
     env: dict[str, Any] = {"c": np.complex128(c)}
@@ -110,7 +110,7 @@ def integral(term: Term, cell: Cell, frames: list[list[Term]], c: float, orders:
     return float(np.sum(weight * value(term, env)).real)
 
 
-def error(region: Region, term: Term, cell: Cell, frames: list[list[Term]], c: float) -> float:
+def error(region: Region, term: Term, cell: FrameCell, frames: list[list[Term]], c: float) -> float:
     orders = (region.outer[0], *region.inner)
     return integral(term, cell, frames, c, orders) - integral(term, cell, frames, c, (40,) * len(orders))
 
@@ -125,7 +125,7 @@ def test_a_rule_errs_by_no_more_than_was_proved(seed: int) -> None:
     for _ in range(30):
         count = r.choice([1, 2])
         term = drawn(r, (*"xy"[:count], "c"), r.randrange(2, 5))
-        frames, cell = bounds[:count], Cell(((0, 1),) * count, term)
+        frames, cell = bounds[:count], FrameCell(((0, 1),) * count, term)
         middle, radius = r.uniform(0.3, 0.7), 2.0**-6
         with np.errstate(all="ignore"):
             region = proved("xy"[:count], frames, [cell], {"c": middle}, {"c": radius}, r.choice([1e-3, 1e-6, 1e-8]))
@@ -150,7 +150,7 @@ def test_many_regions_at_once_are_proved_as_one_by_one() -> None:
     """The same nodes and, to rounding, the same bounds; of a polynomial no variable takes more than it is known to."""
     x, y, c = var("x"), var("y"), var("c")
     frames = [[const(0.0), add(c, const(0.3))], [mul(c, x), add(const(1.0), x)]]
-    cell = Cell(((0, 1), (0, 1)), mul(add(const(2.0), mul(x, y)), prim("exp", mul(c, y))))
+    cell = FrameCell(((0, 1), (0, 1)), mul(add(const(2.0), mul(x, y)), prim("exp", mul(c, y))))
     middles, radius, tolerance = np.array([0.3, 0.5, 0.9]), {"c": 2.0**-6}, 1e-10
     at_once = proved_of_each("xy", frames, cell, {"c": middles}, radius, (None, None), tolerance)
     for number, middle in enumerate(middles):

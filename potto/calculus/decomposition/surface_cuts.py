@@ -1,6 +1,6 @@
 """Surfaces as cuts of one variable: what they decide, what they are a product of, and where their roots are.
 
-Owns `Cut`, `Face` and `Product`.
+Owns `Cut`, `WrittenSurface` and `Product`.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class Jump(Struct, frozen=True):
     strict: bool
 
 
-class Face(Struct, frozen=True):
+class WrittenSurface(Struct, frozen=True):
     """A surface as it was written, and the canonical form, of the same sign, by which it is known."""
 
     form: Term
@@ -73,15 +73,15 @@ class Product(Struct, frozen=True):
     """
 
     along: Term
-    outer: tuple[Face, ...]
+    outer: tuple[WrittenSurface, ...]
     sign: int
 
 
 class Placed(Struct):
     """A surface, what it is a product of (up to `sign`), and what is known of it."""
 
-    face: Face
-    factors: tuple[Face, ...]
+    face: WrittenSurface
+    factors: tuple[WrittenSurface, ...]
     sign: int
     jumps: list[Jump] = []
     turning: bool = False
@@ -89,14 +89,14 @@ class Placed(Struct):
 
 
 @lru_cache(maxsize=8192)
-def face_of(surface: Term) -> tuple[Face, int]:
+def face_of(surface: Term) -> tuple[WrittenSurface, int]:
     """A surface on the side of its canonical form, and +1 or -1 for whether it was there already.
 
     Where variables cancel in the canonical form, that is the surface.
     """
     key, side = normalized_surface(surface)
     form = surface if side > 0 else minus(surface)
-    return Face(form if form.free == key.free else key, key), side
+    return WrittenSurface(form if form.free == key.free else key, key), side
 
 
 @lru_cache(maxsize=8192)
@@ -121,7 +121,7 @@ def cut_of(placed: Placed, variable: str) -> Cut:
     return Cut(surface, key, jumps, turning, tuple(roots), tuple(families), steps, product)
 
 
-def _roots(part: Face, variable: str) -> Sections | None:
+def _roots(part: WrittenSurface, variable: str) -> Sections | None:
     """All the roots of a factor: of the form as written, which keeps digits, else of the canonical one."""
     for surface in (part.form, part.key):
         found = sections_in(surface, variable)
@@ -132,20 +132,20 @@ def _roots(part: Face, variable: str) -> Sections | None:
 
 def cut_along(surface: Term, variable: str) -> Cut:
     """A surface as a cut of one variable, whatever it decides."""
-    return cut_of(Placed(Face(surface, surface), *factored(surface, 1)), variable)
+    return cut_of(Placed(WrittenSurface(surface, surface), *factored(surface, 1)), variable)
 
 
 def _product(terms: tuple[Term, ...]) -> Term:
     return prim("mul", *terms) if len(terms) > 1 else terms[0] if terms else ONE
 
 
-def factored(surface: Term, orientation: int) -> tuple[tuple[Face, ...], int]:
+def factored(surface: Term, orientation: int) -> tuple[tuple[WrittenSurface, ...], int]:
     """The factors of a surface written as a product, or whose summands have factors in common, and the sign of its
     canonical form against theirs.
 
     A surface that is none, or in which a factor comes twice, is its own and only factor.
     """
-    found: dict[Term, Face] = {}
+    found: dict[Term, WrittenSurface] = {}
     sign, waiting = orientation, [surface]
     while waiting:
         item = waiting.pop()

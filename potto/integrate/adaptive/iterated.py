@@ -26,7 +26,7 @@ from potto.integrate.degenerate.empty_ranges import Collapsed, collapsed_ranges,
 from potto.integrate.degenerate.faces import Face
 from potto.integrate.degenerate.kinks import note_flat
 from potto.integrate.degenerate.narrow_panels import count_narrow
-from potto.integrate.degenerate.scene import Scene
+from potto.integrate.degenerate.scene import IteratedVariable
 from potto.integrate.degenerate.undefined import lost_members, sides_at
 from potto.integrate.events import UNSEEN_MEETING, sides_hidden
 from potto.integrate.levels import LevelPlan
@@ -95,7 +95,7 @@ class Iteration(Struct):
         seg = cuts.segments
         if self.extent is not None:
             self.extent.saw_range(number, seg, batch, root)
-        scene = Scene(self, number, level, env, sides, machine, batch, root, slack)
+        scene = IteratedVariable(self, number, level, env, sides, machine, batch, root, slack)
         settled = self.sides_of(scene, seg)
         keep, lost = self.kept(scene, seg, settled)
         if machine.costs is not None and number + 1 == len(self.plan.levels):
@@ -144,7 +144,7 @@ class Iteration(Struct):
         again.et += left_out
         sums.put(members, again.pick(members))
 
-    def count_events(self, scene: Scene, cuts: Cuts, sums: Sums) -> None:
+    def count_events(self, scene: IteratedVariable, cuts: Cuts, sums: Sums) -> None:
         """Add, or say, what cuts matter that lie on a bound or on one another, and surfaces that fold here."""
         machine = scene.machine
         if machine.directions and (cuts.meetings or cuts.edges):
@@ -164,7 +164,7 @@ class Iteration(Struct):
         if machine.directions and cuts.folds:
             note_folds(scene, cuts)
 
-    def kept(self, scene: Scene, seg: Segments, settled: Settled) -> tuple[Ints | None, Ints | None]:
+    def kept(self, scene: IteratedVariable, seg: Segments, settled: Settled) -> tuple[Ints | None, Ints | None]:
         """The segments to integrate over, None for all; and the members that have no value."""
         keep = self.alive(settled.sides, seg, settled.undefined)
         if not settled.undefined:
@@ -234,7 +234,7 @@ class Iteration(Struct):
         rows = searched_rows(level, env, lo, hi, batch, machine, summed)
         return (rows + critical_rows(level, env, lo, hi, batch, machine) if critical else rows), lost
 
-    def sides_of(self, scene: Scene, seg: Segments) -> Settled:
+    def sides_of(self, scene: IteratedVariable, seg: Segments) -> Settled:
         """The sides of all surfaces decided so far: those of this variable from the segments' middles."""
         level = scene.level
         sides = {g: take(mask, seg.owner) for g, mask in scene.sides.items()}

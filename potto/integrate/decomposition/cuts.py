@@ -1,9 +1,9 @@
 """Where the integrals of a batch are cut along one variable.
 
-Owns `segments`: bounds and sections, evaluated for the whole batch with their tangents, sorted, clipped to the
-bounds, and turned into stretches on which the integrand is smooth. A cut counts only strictly inside the bounds: a
-surface that lies exactly on an edge gives no boundary term, and is reported (`Edge`) since the one-sided derivatives
-then differ.
+Owns `segments`: bounds and sections, evaluated for the whole batch with their tangents, sorted, clipped to the bounds,
+and turned into stretches on which the integrand is smooth. A cut counts only strictly inside the bounds: a surface that
+lies exactly on an edge gives no boundary term, and is reported (`SurfaceOnBound`) since the one-sided derivatives then
+differ.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from msgspec.structs import replace
 
 from potto.integrate.decomposition.meetings import (
     SEARCHED,
-    Edge,
-    Fold,
+    FoldsHere,
     Meeting,
     Row,
     Sliver,
+    SurfaceOnBound,
     as_array,
     folds_at,
     meetings,
@@ -58,14 +58,14 @@ class Cuts(Struct):
     sign: Array
     segments: Segments
     moving: bool
-    edges: list[Edge]
+    edges: list[SurfaceOnBound]
     bound_nan: Bools | None
     conflict: bool = False
     paired: bool = False
     rested: bool = False
     meetings: list[Meeting] = []
-    brushes: list[Edge] = []
-    folds: list[Fold] = []
+    brushes: list[SurfaceOnBound] = []
+    folds: list[FoldsHere] = []
     slivers: list[Sliver] = []
     lost: Array | None = None
 
@@ -230,12 +230,12 @@ def finite_speeds(cuts: Cuts) -> Cuts:
 
 def _edges(
     plan: LevelPlan, rows: list[Row], roots: Array, off: Array, speeds: Array, ends: tuple[_End, _End]
-) -> tuple[list[Edge], list[Edge]]:
+) -> tuple[list[SurfaceOnBound], list[SurfaceOnBound]]:
     """Where cuts lie on a bound and do not move with it: those that decide; and the others, also where they lie beside
     it by rounding."""
     decides = np.array([row.cut >= 0 and plan.level.cuts[row.cut].decides for row in rows], dtype=bool)
     (low, _, _), (high, _, _) = ends
-    found: list[tuple[int, Edge]] = []
+    found: list[tuple[int, SurfaceOnBound]] = []
     for upper, (bound, tb, e) in enumerate(ends):
         with np.errstate(invalid="ignore"):
             near = np.where(decides[:, None], 0.0, np.minimum(off + e, _one_place(low, high, roots)))
@@ -247,7 +247,7 @@ def _edges(
             moves = np.abs(speed - tb) > 64 * EPS * np.maximum(np.abs(speed), np.abs(tb))
             owner = np.nonzero(on[i] & np.isfinite(bound) & (low < high) & moves.any(axis=0))[0]
             if owner.size:
-                edge = Edge(rows[i].cut, owner, bool(upper), bound[owner], speed[:, owner], tb[:, owner])
+                edge = SurfaceOnBound(rows[i].cut, owner, bool(upper), bound[owner], speed[:, owner], tb[:, owner])
                 found.append((i, edge))
     found.sort(key=lambda pair: pair[0])
     return [edge for i, edge in found if decides[i]], [edge for i, edge in found if not decides[i]]
@@ -302,7 +302,7 @@ def _agree(t: Array, same: Bools, rank: Ints) -> None:
 
 def _pieces(
     x: Array, e: Array, t: Array, rank: Ints, blur: Array, sign: Array, beyond: list[tuple[Array, bool]],
-    edges: list[Edge],
+    edges: list[SurfaceOnBound],
 ) -> Cuts:  # fmt: skip
     a, b = x[:-1], x[1:]
     owner, place = np.nonzero((b > a).T)

@@ -1,6 +1,6 @@
 """Candidate cuts of one variable, and where they meet: on a bound, on one another, or where roots merge.
 
-Owns `Row`, `Edge`, `Meeting`, `Sliver` and `Fold`.
+Owns `Row`, `SurfaceOnBound`, `Meeting`, `Sliver` and `FoldsHere`.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ class Row(Struct):
     hides: Any = None
 
 
-class Edge(Columns):
+class SurfaceOnBound(Columns):
     """A surface that lies on a bound, for some of the batch: `owner` (m,), at the upper bound or not, its speeds."""
 
     cut: int
@@ -79,7 +79,7 @@ class Sliver(Columns):
     passes: Array
 
 
-class Fold(Struct):
+class FoldsHere(Struct):
     """Sections of a surface that appear, merge or turn just here, for some of the batch: `owner` (m,), place (m,)."""
 
     cut: int
@@ -184,11 +184,11 @@ def _close(x: Array, off: Array) -> list[tuple[int, int]]:
 
 def folds_at(
     plan: LevelPlan, rows: list[Row], low: Array, high: Array, directions: int, batch: int, nested: bool
-) -> list[Fold]:
+) -> list[FoldsHere]:
     """Where roots of one surface are at one place, or one on which the integrand jumps moves infinitely fast; and where
     they merge to rounding, but for nodes of variables further out, which are cut where that happens. Those that only
     further in are something count where they go apart infinitely fast: what appears between them may be anything."""
-    out: list[Fold] = []
+    out: list[FoldsHere] = []
     before: dict[int, list[Any]] = {}
     for row in rows:
         others = before.setdefault(row.cut, [])
@@ -212,5 +212,5 @@ def folds_at(
             folded = folded | (flat & (tangents(row.t, batch, directions) != 0).any(axis=0))
         owner = np.nonzero(folded & (x >= low) & (x <= high))[0]
         if owner.size:
-            out.append(Fold(row.cut, owner, x[owner]))
+            out.append(FoldsHere(row.cut, owner, x[owner]))
     return out

@@ -19,8 +19,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from potto.integrate.decomposition.cuts import NARROW, Cuts
-from potto.integrate.decomposition.meetings import Edge, Meeting, as_array
-from potto.integrate.degenerate.scene import Scene, all_subsets
+from potto.integrate.decomposition.meetings import Meeting, SurfaceOnBound, as_array
+from potto.integrate.degenerate.scene import IteratedVariable, all_subsets
 from potto.integrate.events import Fold, Spot, TwoSided, on_a_bound
 from potto.integrate.levels import LevelPlan
 from potto.integrate.pieces import Sums, components, still
@@ -34,7 +34,7 @@ SURE = 1.001  # what rounding may add to a bound
 BESIDE_A_CUT = 2.0**-20
 
 
-def count_places(scene: Scene, cuts: Cuts, sums: Sums) -> None:
+def count_places(scene: IteratedVariable, cuts: Cuts, sums: Sums) -> None:
     """Add to the tangents what surfaces on bounds and on one another contribute; say where they have two sides."""
     level, machine = scene.level, scene.machine
     places: list[tuple[Ints, Callable[[], tuple[Array, Array, Array]], bool, TwoSided]] = []
@@ -70,7 +70,7 @@ def count_places(scene: Scene, cuts: Cuts, sums: Sums) -> None:
             machine.note(named, scene.below(owner[two]))
 
 
-def count_slivers(scene: Scene, cuts: Cuts, sums: Sums) -> None:
+def count_slivers(scene: IteratedVariable, cuts: Cuts, sums: Sums) -> None:
     """Add to the errors what may lie between surfaces that rounding does not tell apart, and say where one may be on
     either side of a bound."""
     machine = scene.machine
@@ -102,7 +102,7 @@ def count_slivers(scene: Scene, cuts: Cuts, sums: Sums) -> None:
             sums.gross[1, sliver.owner] += swept.max(axis=0) / EPS
 
 
-def note_folds(scene: Scene, cuts: Cuts) -> None:
+def note_folds(scene: IteratedVariable, cuts: Cuts) -> None:
     """Say where sections of a surface appear or merge just here. At single nodes further out that is no matter."""
     levels, number = scene.parent.plan.levels, scene.number
     for fold in cuts.folds:
@@ -125,7 +125,7 @@ def note_folds(scene: Scene, cuts: Cuts) -> None:
         scene.machine.note(Fold(named, tuple(spots)), members)
 
 
-def _apart(scene: Scene, owner: Ints) -> Ints:
+def _apart(scene: IteratedVariable, owner: Ints) -> Ints:
     """The nodes of variables further out at which something happens, but for those beside one another: crowded next to
     the end of a panel, as rules have them where they turn, they are within rounding of the place where it is cut."""
     levels = scene.parent.plan.levels[: scene.number]
@@ -141,7 +141,7 @@ def _apart(scene: Scene, owner: Ints) -> Ints:
     return np.sort(order[~(near[1:] | near[:-1])])
 
 
-def _reach(scene: Scene, level: LevelPlan) -> Array:
+def _reach(scene: IteratedVariable, level: LevelPlan) -> Array:
     """How far the range of a variable further out goes, for each of a batch."""
     quiet = scene.machine.with_directions(0)
     ends = quiet.evaluate(level.bounds, {n: still(scene.env[n]) for n in level.bounds.params}, None)
@@ -149,12 +149,12 @@ def _reach(scene: Scene, level: LevelPlan) -> Array:
     return np.abs(hi - lo)
 
 
-def _not_known(scene: Scene, sums: Sums, owner: Ints, unknown: Bools, named: TwoSided) -> None:
+def _not_known(scene: IteratedVariable, sums: Sums, owner: Ints, unknown: Bools, named: TwoSided) -> None:
     sums.et[:, :, owner] = np.where(unknown, np.inf, sums.et[:, :, owner])
     scene.machine.note(on_a_bound(named), scene.below(owner[unknown.any(axis=(0, 1))]))
 
 
-def at_one_place(scene: Scene, seg: Segments, meeting: Meeting) -> tuple[Array, Array, Array]:
+def at_one_place(scene: IteratedVariable, seg: Segments, meeting: Meeting) -> tuple[Array, Array, Array]:
     """What the forward and the backward derivative have beyond that of the merged cut, (m, k, B); and their size."""
     v = meeting.speeds
     order = np.stack([np.argsort(sign * v, axis=0, kind="stable") for sign in (1, -1)])
@@ -169,7 +169,7 @@ def at_one_place(scene: Scene, seg: Segments, meeting: Meeting) -> tuple[Array, 
     return forward, backward, np.moveaxis(scale, 0, 1)
 
 
-def at_a_bound(scene: Scene, seg: Segments, edges: Sequence[Edge]) -> tuple[Array, Array, Array]:
+def at_a_bound(scene: IteratedVariable, seg: Segments, edges: Sequence[SurfaceOnBound]) -> tuple[Array, Array, Array]:
     """What the forward and the backward derivative have beyond that without these surfaces, (m, k, B); their size."""
     first = edges[0]
     inward = np.stack([e.bound_t - e.root_t if e.upper else e.root_t - e.bound_t for e in edges])
@@ -207,12 +207,12 @@ def room(seg: Segments, owner: Ints, x: Array) -> Array:
     return np.asarray(found[owner])
 
 
-def _on_one_bound(edges: Sequence[Edge], batch: int) -> list[list[Edge]]:
+def _on_one_bound(edges: Sequence[SurfaceOnBound], batch: int) -> list[list[SurfaceOnBound]]:
     """Edges with those others that lie on the same bound of the same members, members with the same ones together.
 
     Where two sections of one surface meet on a bound it folds there, and which of them come in is not known.
     """
-    out: list[list[Edge]] = []
+    out: list[list[SurfaceOnBound]] = []
     for upper in (False, True):
         here = [e for e in edges if e.upper == upper]
         if not here:

@@ -12,7 +12,7 @@ import numpy as np
 from potto.integrate.columns import distinct
 from potto.integrate.decomposition.cuts import Cuts
 from potto.integrate.degenerate.faces import THIN, Place, crossing, running, running_along, several
-from potto.integrate.degenerate.scene import Scene, around, placed
+from potto.integrate.degenerate.scene import IteratedVariable, around, placed
 from potto.integrate.events import Degenerate
 from potto.integrate.panels.panel_batch import PanelBatch
 from potto.integrate.pieces import Crossing, Pieces, take
@@ -43,7 +43,7 @@ def steps_at_cuts(work: PanelBatch, whole: Pieces) -> Crossing | None:
         return None
     owner, x = seg.owner[right], seg.a[right]
     width = np.minimum((seg.b - seg.a)[right], (seg.b - seg.a)[left])
-    scene = Scene(work.parent, work.number, work.level, work.env, {}, work.machine, work.batch, work.root)
+    scene = IteratedVariable(work.parent, work.number, work.level, work.env, {}, work.machine, work.batch, work.root)
     along = running(scene, owner, x, np.maximum(seg.ea[right], x - seg.b[left]))
     if not (work.conflict or work.rested or along.any()):
         return None
@@ -108,7 +108,7 @@ def _move_as_one(work: PanelBatch, whole: Pieces, left: Ints, right: Ints, jump:
     return True
 
 
-def _between(scene: Scene, seg: Segments, left: Ints, right: Ints) -> Ints:
+def _between(scene: IteratedVariable, seg: Segments, left: Ints, right: Ints) -> Ints:
     """The members for which several surfaces run along what is further in between two segments, where neither says
     what lies between them."""
     owner, x = seg.owner[right], seg.a[right]
@@ -127,7 +127,7 @@ def _neighbours(seg: Segments) -> tuple[Ints, Ints]:
     return wide[together], wide[together + 1]
 
 
-def beneath(scene: Scene, cuts: Cuts) -> None:
+def beneath(scene: IteratedVariable, cuts: Cuts) -> None:
     """Whether a surface runs along what is further in just where one of this variable is, and moves otherwise: in
     another order of the variables both have sections."""
     seg = cuts.segments
@@ -139,7 +139,7 @@ def beneath(scene: Scene, cuts: Cuts) -> None:
         scene.machine.note(Degenerate(scene.level.variable), scene.below(members))
 
 
-def brush(scene: Scene, cuts: Cuts) -> None:
+def brush(scene: IteratedVariable, cuts: Cuts) -> None:
     """Whether what is further in jumps at a bound on which it should only bend: a surface runs along the bound.
 
     Looked at on both sides of the bound, with the surfaces of this variable as they are inside.
@@ -166,7 +166,7 @@ def brush(scene: Scene, cuts: Cuts) -> None:
             scene.machine.note(Degenerate(scene.level.variable), scene.below(owner[jumps]))
 
 
-def _inside(scene: Scene, owner: Ints, x: Array, sides: dict[int, Mask]) -> Array:
+def _inside(scene: IteratedVariable, owner: Ints, x: Array, sides: dict[int, Mask]) -> Array:
     """What is further in at several places for each of some members, (m, places, members)."""
     many = np.tile(owner, x.size // owner.size)
     values, _ = scene.inside(many, placed(scene.level, many, x, scene.env, {})[0], sides)
@@ -179,7 +179,7 @@ def does_jump(steps: Array, size: Array) -> Bools:
     return np.asarray(((near > 0.5 * far) & (near > DISCONTINUITY * size)).any(axis=0))
 
 
-def _bends(scene: Scene, owner: Ints, x: Array, upper: bool) -> bool:
+def _bends(scene: IteratedVariable, owner: Ints, x: Array, upper: bool) -> bool:
     """Whether it is plain that no surface runs along the bound: all sections in the innermost variable are slow."""
     levels, frozen = scene.parent.plan.levels, scene.machine.with_directions(0)
     further = levels[scene.number + 1]

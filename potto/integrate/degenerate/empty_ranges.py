@@ -16,7 +16,7 @@ from msgspec.structs import replace
 
 from potto.integrate.decomposition.meetings import SEARCHED, Row, as_array, tangents
 from potto.integrate.degenerate.coincidences import one_by_one
-from potto.integrate.degenerate.scene import Scene
+from potto.integrate.degenerate.scene import IteratedVariable
 from potto.integrate.events import EMPTY_UNDEFINED, EMPTY_UNSEEN, Shortfall, TwoSided
 from potto.integrate.levels import LevelPlan
 from potto.integrate.pieces import Sums
@@ -84,7 +84,7 @@ def _by_jumps(jumps: list[Row], x: Array, empty: Bools) -> Iterator[tuple[Ints, 
         yield owner, [row for row, there in zip(jumps, pattern, strict=True) if there]
 
 
-def count_collapsed(scene: Scene, found: list[Collapsed], sums: Sums) -> Sums:
+def count_collapsed(scene: IteratedVariable, found: list[Collapsed], sums: Sums) -> Sums:
     """The sums with what ranges of length zero grow by, and what rounding of their bounds may hide."""
     for ranges in found:
         if ranges.cuts and scene.parent.plan.hides:
@@ -137,6 +137,6 @@ def _note_gross(sums: Sums, owner: Ints, rates: Array) -> None:
     sums.gross = gross
 
 
-def _unknown(scene: Scene, ranges: Collapsed, sums: Sums, why: Shortfall) -> None:
+def _unknown(scene: IteratedVariable, ranges: Collapsed, sums: Sums, why: Shortfall) -> None:
     sums.et[:, :, ranges.owner] = np.inf
     scene.machine.note(why, scene.below(ranges.owner))

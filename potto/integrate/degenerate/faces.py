@@ -19,7 +19,7 @@ from msgspec import Struct
 
 from potto.core.terms import Lam, Term, children, function_of
 from potto.integrate.columns import distinct
-from potto.integrate.degenerate.scene import CLEAR, Scene
+from potto.integrate.degenerate.scene import CLEAR, IteratedVariable
 from potto.integrate.pieces import Crossing, Evaluator, components, gather, still, take
 from potto.integrate.plan import Plan
 from potto.integrate.rules.gauss import EPS
@@ -47,7 +47,7 @@ class Place(Struct, frozen=True):
     jump: Array
 
 
-class Along(Struct, frozen=True):
+class AlongPlaces(Struct, frozen=True):
     """Which surfaces run along the variables further in at some places, and which of them cross 0 there: (G, P)."""
 
     there: Bools
@@ -93,7 +93,7 @@ def _size(x: Number | None) -> Number:
     return 0.0 if x is None else np.abs(x)
 
 
-def crossing(scene: Scene, place: Place, tolerance: Array) -> Crossing | None:
+def crossing(scene: IteratedVariable, place: Place, tolerance: Array) -> Crossing | None:
     """What crosses surfaces that run along the variables further in; None where it is not one surface that makes what
     is further in jump."""
     if scene.parent.plan.hides or scene.machine.frozen:
@@ -119,7 +119,7 @@ def crossing(scene: Scene, place: Place, tolerance: Array) -> Crossing | None:
     return found
 
 
-def _crossed(scene: Scene, place: Place, group: int, here: Bools) -> tuple[Array, Array, Array, Array]:
+def _crossed(scene: IteratedVariable, place: Place, group: int, here: Bools) -> tuple[Array, Array, Array, Array]:
     """What jumps across a face, and that times its speeds, with their errors: (m, P) and (m, k, P)."""
     level = next(level for level in scene.parent.plan.levels if group in level.decided)
     surface = children(level.surfaces.body)[level.decided.index(group)]
@@ -134,27 +134,27 @@ def _crossed(scene: Scene, place: Place, group: int, here: Bools) -> tuple[Array
     return sums.v, sums.e, sums.t, sums.et
 
 
-def running(scene: Scene, owner: Ints, x: Array, off: Array) -> Bools:
+def running(scene: IteratedVariable, owner: Ints, x: Array, off: Array) -> Bools:
     """At which places, of some members, a surface runs along the variables further in, as far as that can be seen."""
     along = None if scene.parent.plan.hides or scene.machine.frozen else _running_along(scene, owner, x, off)
     return np.zeros(owner.size, dtype=bool) if along is None else np.asarray(along.there.any(axis=0))
 
 
-def several(scene: Scene, owner: Ints, x: Array, off: Array) -> Bools:
+def several(scene: IteratedVariable, owner: Ints, x: Array, off: Array) -> Bools:
     """At which places, of some members, more than one surface runs along the variables further in: what lies between
     them may be seen from neither side."""
     along = _running_along(scene, owner, x, off)
     return np.zeros(owner.size, dtype=bool) if along is None else along.there.sum(axis=0) > 1
 
 
-def running_along(scene: Scene, owner: Ints, x: Array, off: Array) -> Ints:
+def running_along(scene: IteratedVariable, owner: Ints, x: Array, off: Array) -> Ints:
     """The members that have places at which a surface runs along the variables further in."""
     along = _running_along(scene, owner, x, off)
     members: Ints = distinct(owner[:0] if along is None else owner[along.there.any(axis=0)])
     return members
 
 
-def _the_only_one(scene: Scene, along: Bools) -> Ints:
+def _the_only_one(scene: IteratedVariable, along: Bools) -> Ints:
     """Per place the group of the one surface that runs along, -1 if there is none, or several."""
     further = scene.parent.plan.levels[scene.number + 1 :]
     groups = np.array([group for level in further for group in level.decided])
@@ -162,7 +162,7 @@ def _the_only_one(scene: Scene, along: Bools) -> Ints:
     return found
 
 
-def _running_along(scene: Scene, owner: Ints, x: Array, off: Array) -> Along | None:
+def _running_along(scene: IteratedVariable, owner: Ints, x: Array, off: Array) -> AlongPlaces | None:
     """Which of the surfaces further in are 0 at some places, all along the variables further in, (G, P); None where
     that cannot be looked at."""
     further = scene.parent.plan.levels[scene.number + 1 :]
@@ -189,4 +189,4 @@ def _running_along(scene: Scene, owner: Ints, x: Array, off: Array) -> Along | N
             near = (size[:, 0] <= CLEAR * (e[:, 0] + steepest * off)) & (steepest > 0)
             along.append(near.all(axis=0))
             simple.append((slope[:, 0] >= SIMPLE * steepest).all(axis=0))
-    return Along(np.array(along), np.array(simple))
+    return AlongPlaces(np.array(along), np.array(simple))

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from potto.core.terms import Term, function_of
-from potto.integrate.degenerate.scene import CLEAR, Scene
+from potto.integrate.degenerate.scene import CLEAR, IteratedVariable
 from potto.integrate.degenerate.undefined import LOOKED_AT
 from potto.integrate.events import Along
 from potto.integrate.pieces import Evaluator, components, gather, still
@@ -89,7 +89,7 @@ def _resting_at_0(value: Cell, owner: Ints) -> Ints:
     return np.unique(owner[np.broadcast_to(there, owner.shape)])
 
 
-def note_flat(scene: Scene, seg: Segments, flat: dict[int, Bools]) -> None:
+def note_flat(scene: IteratedVariable, seg: Segments, flat: dict[int, Bools]) -> None:
     """Say which surfaces lie all along segments, and move there. flat: by group, the segments on which it is 0 wherever
     it was looked at."""
     level, machine = scene.level, scene.machine

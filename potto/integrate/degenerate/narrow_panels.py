@@ -13,7 +13,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from potto.integrate.degenerate.scene import Scene, placed
+from potto.integrate.degenerate.scene import IteratedVariable, placed
 from potto.integrate.events import TwoSided
 from potto.integrate.pieces import Sums, take
 from potto.integrate.rules import substitution
@@ -24,7 +24,7 @@ MOST_SURFACES = 4  # whose sides are turned round in all combinations, at one st
 
 
 def count_narrow(
-    scene: Scene, seg: Segments, sides: Mapping[int, Mask], doubtful: Mapping[int, Bools], sums: Sums
+    scene: IteratedVariable, seg: Segments, sides: Mapping[int, Mask], doubtful: Mapping[int, Bools], sums: Sums
 ) -> None:
     """Add to the errors what the integrand is on other sides of narrow stretches: doubtful says, by group, of which.
 
@@ -61,7 +61,9 @@ def _at_ends(seg: Segments) -> Bools:
     return np.asarray((seg.a == first[seg.owner]) | (seg.b == last[seg.owner]))
 
 
-def _difference(scene: Scene, seg: Segments, sides: Mapping[int, Mask], groups: list[int], part: Ints) -> Array:
+def _difference(
+    scene: IteratedVariable, seg: Segments, sides: Mapping[int, Mask], groups: list[int], part: Ints
+) -> Array:
     """How far the integrand in the middle of some segments is from what it is with sides of some groups turned round,
     any of them: (m, S)."""
     x, _, _ = substitution.points(seg.pick(part), np.full((part.size, 1), 0.5))

@@ -1,6 +1,6 @@
 """One variable of an iteration as it is being integrated, and its integrand at places beside where it is cut.
 
-Owns `Scene`, and what is there `around` a place: its environment, and the sides of all surfaces.
+Owns `IteratedVariable`, and what is there `around` a place: its environment, and the sides of all surfaces.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ BESIDE, CLEAR = 1e-7, 4.0
 NEARER, RESTS, FALLS = (2.0**-30, 2.0**-40, 2.0**-50), 1e-7, 0.9
 
 
-class Scene(Struct, frozen=True):
+class IteratedVariable(Struct, frozen=True):
     """One variable of an iteration as it is being integrated: everything that is needed to evaluate its integrand.
 
     slack: as `Iteration.run` takes it."""

@@ -14,7 +14,7 @@ import numpy as np
 from potto.core.terms import function_of
 from potto.integrate.columns import distinct
 from potto.integrate.decomposition.vanishing import vanishes
-from potto.integrate.degenerate.scene import Scene, placed, surfaces_at
+from potto.integrate.degenerate.scene import IteratedVariable, placed, surfaces_at
 from potto.integrate.events import undefined
 from potto.integrate.levels import LevelPlan
 from potto.integrate.pieces import Evaluator, gather, still, take
@@ -54,7 +54,7 @@ def _clearer(first: tuple[Array, Array], second: tuple[Array, Array]) -> tuple[A
     return np.where(other, w, v), np.where(other, off, e)
 
 
-def lost_members(scene: Scene, seg: Segments, undefined: dict[int, Bools], alive: Ints | None) -> Ints:
+def lost_members(scene: IteratedVariable, seg: Segments, undefined: dict[int, Bools], alive: Ints | None) -> Ints:
     """The members whose integrand is not a number on one of the segments on which a surface is not defined.
 
     undefined: by group, those segments; alive: the segments that count, None for all. It is told where the first is.

@@ -1,7 +1,8 @@
 """Functions of one number as polynomials on pieces, with their tangents and errors.
 
-Owns `Table` and `tabulated`. The pieces lie between the places where the function is not smooth, which are known and
-move with the parameters; each is halved until its Legendre coefficients say that the polynomial is as good as asked.
+Owns `InterpolantTable` and `tabulated`. The pieces lie between the places where the function is not smooth, which are
+known and move with the parameters; each is halved until its Legendre coefficients say that the polynomial is as good as
+asked.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from msgspec.structs import replace
 
 from potto.integrate.pieces import Sums
 from potto.integrate.rules import substitution
-from potto.integrate.rules.gauss import EPS, Rule, gauss
+from potto.integrate.rules.gauss import EPS, GaussRule, gauss
 from potto.integrate.rules.substitution import Segments
 from potto.kernels.cells import Array, Cell, Ints
 
@@ -29,7 +30,7 @@ SEEN = 0.1  # of the largest value
 Function = Callable[[Array, Array], Sums]
 
 
-class Table(Struct, frozen=True):
+class InterpolantTable(Struct, frozen=True):
     """V(s) for s in [x0[0], x1[-1]].
 
     Each piece runs from u0 to u1 of the map of its segment, and from x0 to x1. coefficients: (2 + k, P, n) of shifted
@@ -87,7 +88,7 @@ class Table(Struct, frozen=True):
 
 def tabulated(
     segments: Segments, k: int, function: Function, rtol: float, exhausted: Callable[[], bool]
-) -> Table | None:  # fmt: skip
+) -> InterpolantTable | None:  # fmt: skip
     """The function on the segments; None where it is not continuous, does not become smooth on pieces, or takes more
     than there is."""
     count = segments.a.size
@@ -132,7 +133,7 @@ def _lengths(segments: Segments) -> Array:
 
 def _joined(
     segments: Segments, parts: list[tuple[Ints, Array, Array, Array, Array, Array]]
-) -> tuple[Table, Array]:  # fmt: skip
+) -> tuple[InterpolantTable, Array]:  # fmt: skip
     """The table of pieces that were finished at different times, in order, and the errors of V by its nodes alone."""
     segment = np.concatenate([part[0] for part in parts])
     u0, u1 = (np.concatenate([part[i] for part in parts]) for i in (1, 2))
@@ -140,13 +141,13 @@ def _joined(
     inside = np.concatenate([part[5] for part in parts])
     x0, x1 = (substitution.points(segments.pick(segment), u[:, None])[0][:, 0] for u in (u0, u1))
     order = np.lexsort((u0, segments.a[segment]))
-    table = Table(segments, segment[order], u0[order], u1[order], x0[order], x1[order], coefficients[:, order],
-                  error[:, order])  # fmt: skip
+    table = InterpolantTable(segments, segment[order], u0[order], u1[order], x0[order], x1[order],
+                             coefficients[:, order], error[:, order])  # fmt: skip
     return table, inside[order]
 
 
 def _measured(
-    segments: Segments, todo: tuple[Ints, Array, Array], k: int, function: Function, rule: Rule
+    segments: Segments, todo: tuple[Ints, Array, Array], k: int, function: Function, rule: GaussRule
 ) -> tuple[Array, Array, Array]:
     """Coefficients of pieces, the errors of what they are made of, and the largest magnitudes (2 + k,)."""
     segment, u0, u1 = todo
@@ -168,7 +169,7 @@ def _measured(
 
 
 def _off_at_the_ends(
-    segments: Segments, todo: tuple[Ints, Array, Array], coefficients: Array, function: Function, rule: Rule
+    segments: Segments, todo: tuple[Ints, Array, Array], coefficients: Array, function: Function, rule: GaussRule
 ) -> Array:
     """By how much polynomials miss the function at the ends of their pieces, where peaks are and no nodes: (P,)."""
     segment, u0, u1 = todo
@@ -193,7 +194,7 @@ def _cut_off(size: Array) -> Array:
     return lost
 
 
-def _continuous(table: Table, inside: Array, rule: Rule, largest: float) -> bool:
+def _continuous(table: InterpolantTable, inside: Array, rule: GaussRule, largest: float) -> bool:
     """Whether neighbouring pieces meet where no jump is known.
 
     Where they don't, something runs along the variable that was integrated.

@@ -43,7 +43,7 @@ from potto.integrate.adaptive.iterated import Iteration
 from potto.integrate.decomposition.cuts import Cuts
 from potto.integrate.decomposition.vanishing import vanishing_of
 from potto.integrate.degenerate.degeneracies import BESIDE, does_jump
-from potto.integrate.elimination.interpolants import Table, tabulated
+from potto.integrate.elimination.interpolants import InterpolantTable, tabulated
 from potto.integrate.events import Fold, TwoSided
 from potto.integrate.levels import LevelPlan, group_levels, level_plan
 from potto.integrate.outline import Outline
@@ -161,7 +161,7 @@ def _centers(term: Integral, variable: str, resolve: Resolve) -> list[Finding]:
 class _Tabled(Iteration):
     """The integral of one step: weight times what is further in, by its table, or the number that it is."""
 
-    further: Table | Cell | None = None
+    further: InterpolantTable | Cell | None = None
 
     def body(self, env: dict[str, Value], sides: dict[int, Mask], machine: Evaluator) -> Value:
         tracking, k = machine.tracking(), self.machine.directions
@@ -169,7 +169,7 @@ class _Tabled(Iteration):
         if self.further is None:
             return weight
         further = self.further
-        if isinstance(further, Table):
+        if isinstance(further, InterpolantTable):
             assert isinstance(weight, tuple)
             weight, passed = weight
             assert isinstance(passed, Cell)
@@ -187,7 +187,7 @@ def one_by_one(
     finer = replace(settings, rtol=max(SHARE * settings.rtol, FINEST), atol=0.0, max_evals=most)
     fine = machine.changed(settings=finer)
     spans = _spans(known.steps, env)
-    further: Table | Cell | None = None
+    further: InterpolantTable | Cell | None = None
     sums: Sums | None = None
     rows = list(zip(known.plans, known.states, spans, strict=True))
     for plan, state, span in reversed(rows):
@@ -195,21 +195,21 @@ def one_by_one(
         if state is None:
             sums = _Tabled(plan, fine, START_ORDER, tracked=True, further=below).run(0, env, 1, {}, fine)
             (further,) = sums.cells(())
-            if isinstance(below, Table) and not below.seen:
+            if isinstance(below, InterpolantTable) and not below.seen:
                 return None
             continue
         # As one inside another: how much each may err is measured by the largest of all.
         inside = replace(plan, outline=replace(plan.outline, levels=(state, *plan.levels)))
         iteration = _Tabled(inside, fine, START_ORDER, tracked=True, further=further)
         further = _table(iteration, state, span, fine, env)
-        if further is None or fine.exhausted() or (isinstance(below, Table) and not below.seen):
+        if further is None or fine.exhausted() or (isinstance(below, InterpolantTable) and not below.seen):
             return None
     return sums
 
 
 def _table(
     iteration: Iteration, state: LevelPlan, span: tuple[float, float], machine: Any, env: dict[str, Value]
-) -> Table | None:  # fmt: skip
+) -> InterpolantTable | None:  # fmt: skip
     env = {**env, LOW: Cell(span[0]), HIGH: Cell(span[1])}
     found, _ = iteration.cut(state, env, 1, machine, np.zeros(1, dtype=np.int64))
     segments = found.segments

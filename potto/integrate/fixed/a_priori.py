@@ -21,14 +21,14 @@ import numpy as np
 from msgspec import Struct
 
 from potto.core.terms import children
-from potto.integrate.fixed.alone import Face, machine_code, promotion, summed_alone, summed_by
-from potto.integrate.fixed.moving_sums import Totals, evaluated, summed
+from potto.integrate.fixed.alone import RegionPart, machine_code, promotion, summed_alone, summed_by
+from potto.integrate.fixed.moving_sums import MovingTotals, evaluated, summed
 from potto.integrate.fixed.on_bounds import OnBounds, Place, Tied
 from potto.integrate.fixed.regions import LOOSEST, Path, Places, known, region_of, settle
-from potto.integrate.fixed.straight import CLEAR, Straight, nothing
+from potto.integrate.fixed.straight import CLEAR, StraightIntegral, nothing
 from potto.integrate.pieces import Evaluator, Sums
 from potto.integrate.rules.gauss import EPS
-from potto.integrate.rules.proved_orders import Cell as Stretch
+from potto.integrate.rules.proved_orders import FrameCell as Stretch
 from potto.integrate.rules.proved_orders import Region
 from potto.kernels.cells import Cell, Value
 from potto.kernels.making import making
@@ -52,7 +52,11 @@ class Crowded(_NotPlain):
 
 
 def _cells(
-    plan: Straight, machine: Evaluator, env: dict[str, Value], frame: tuple[Cell, ...], ties: OnBounds | None = None
+    plan: StraightIntegral,
+    machine: Evaluator,
+    env: dict[str, Value],
+    frame: tuple[Cell, ...],
+    ties: OnBounds | None = None,
 ) -> tuple[tuple[Stretch, ...], float]:
     """The cells between the cuts, with the integrand on each; those on which it is 0 left out. And the least length.
 
@@ -84,7 +88,7 @@ def _cells(
 
 
 def _stretches(
-    plan: Straight, i: int, machine: Evaluator, values: tuple[Cell, ...], ties: OnBounds | None
+    plan: StraightIntegral, i: int, machine: Evaluator, values: tuple[Cell, ...], ties: OnBounds | None
 ) -> list[tuple[int, int, float, float]]:
     """Between which rows of the frame one variable runs, the middles and the lengths, which are 0 between a bound and
     a cut that lies on it."""
@@ -129,7 +133,7 @@ def _outside(place: Place, lo: Place, hi: Place) -> bool:
     return half * (away + place[1]) < away * away
 
 
-def _sides(plan: Straight, machine: Evaluator, env: dict[str, Value]) -> tuple[bool, ...]:
+def _sides(plan: StraightIntegral, machine: Evaluator, env: dict[str, Value]) -> tuple[bool, ...]:
     if not children(plan.surfaces.body):
         return ()
     sides = []
@@ -144,7 +148,7 @@ def _sides(plan: Straight, machine: Evaluator, env: dict[str, Value]) -> tuple[b
 # The integral
 
 
-def certain(plan: Straight, machine: Evaluator, env: dict[str, Value]) -> Sums | None:
+def certain(plan: StraightIntegral, machine: Evaluator, env: dict[str, Value]) -> Sums | None:
     """The integral for one set of parameters; None where something about it is not plain. Raises Crowded."""
     try:
         found = _summed(plan, machine, env)
@@ -155,7 +159,7 @@ def certain(plan: Straight, machine: Evaluator, env: dict[str, Value]) -> Sums |
     return None if found is None else _sums(found)
 
 
-def beside_bounds(plan: Straight, machine: Evaluator, env: dict[str, Value]) -> Tied | None:
+def beside_bounds(plan: StraightIntegral, machine: Evaluator, env: dict[str, Value]) -> Tied | None:
     """The integral for one set of parameters at which cuts lie on bounds, to either side, and just there, where it has
     the derivative of one of them. None where something else about it is not plain.
 
@@ -168,7 +172,7 @@ def beside_bounds(plan: Straight, machine: Evaluator, env: dict[str, Value]) -> 
     frame = evaluated(plan.frames[0], machine.tracking(), env)
     ties = OnBounds()
 
-    def total(inside: frozenset[Any]) -> Totals:
+    def total(inside: frozenset[Any]) -> MovingTotals:
         ties.inside = inside
         if (found := _between(plan, machine, env, frame, values, ties)) is None:
             raise _NotPlain
@@ -184,20 +188,19 @@ def beside_bounds(plan: Straight, machine: Evaluator, env: dict[str, Value]) -> 
         return None
     near = backward if ties.lie_backward() else forward
     error = max(one.error[0] for one in (backward, forward))
-    whole = Totals(near.number, [error, *near.error[1:]], near.gross)
+    whole = MovingTotals(near.number, [error, *near.error[1:]], near.gross)
     return Tied(_sums(whole), _sums(backward), _sums(forward), ties.causes(plan))
 
 
 def _between(
-    plan: Straight, machine: Evaluator, env: dict[str, Value], frame: tuple[Cell, ...], values: dict[str, float],
-    ties: OnBounds,
-) -> Totals | None:  # fmt: skip
+    plan: StraightIntegral, machine: Evaluator, env: dict[str, Value], frame: tuple[Cell, ...], values: dict[str,
+    float], ties: OnBounds, ) -> MovingTotals | None:  # fmt: skip
     """The sum over the cells that there are where such cuts have come in as `ties` says."""
     reach, rtol = float(frame[1].v - frame[0].v), min(machine.rtol, LOOSEST)
     cells, shortest = _cells(plan, machine, env, frame, ties)
     if not cells:
         nothing = [0.0] * (1 + machine.directions)
-        return Totals(nothing, nothing, nothing)
+        return MovingTotals(nothing, nothing, nothing)
     proof = _proved(plan, cells, values, reach, shortest, rtol)
     if proof is None:
         return None
@@ -209,7 +212,12 @@ def _between(
 
 
 def _proved(
-    plan: Straight, cells: tuple[Stretch, ...], values: dict[str, float], reach: float, shortest: float, rtol: float
+    plan: StraightIntegral,
+    cells: tuple[Stretch, ...],
+    values: dict[str, float],
+    reach: float,
+    shortest: float,
+    rtol: float,
 ) -> tuple[Region, Places] | None:
     """As `region_of`; None, too, where there are more cells or nodes than can be afforded."""
     proof = region_of(plan, cells, values, reach, shortest, rtol) if len(cells) <= MOST_CELLS else None
@@ -217,13 +225,13 @@ def _proved(
     return proof if few else None
 
 
-def _sums(found: Totals) -> Sums:
+def _sums(found: MovingTotals) -> Sums:
     block = np.array((found.number, found.error))[:, None, :, None]
     added = np.array([[found.gross[0]], [max(found.gross[1:], default=0.0)]])
     return Sums(block[0, :, 0], block[1, :, 0], block[0, :, 1:], block[1, :, 1:], gross=added)
 
 
-def proved_sum(plan: Straight, machine: Evaluator, env: dict[str, Value]) -> Totals | None:
+def proved_sum(plan: StraightIntegral, machine: Evaluator, env: dict[str, Value]) -> MovingTotals | None:
     """The same as plain numbers, errors with what rules leave out; None where cuts are crowded, too."""
     try:
         return _summed(plan, machine, env)
@@ -231,7 +239,7 @@ def proved_sum(plan: Straight, machine: Evaluator, env: dict[str, Value]) -> Tot
         return None
 
 
-def _summed(plan: Straight, machine: Evaluator, env: dict[str, Value]) -> Totals | None:
+def _summed(plan: StraightIntegral, machine: Evaluator, env: dict[str, Value]) -> MovingTotals | None:
     plan, values = _decided(plan, machine, env)
     if values is None or machine.frozen or machine.side:
         return None
@@ -243,7 +251,7 @@ def _summed(plan: Straight, machine: Evaluator, env: dict[str, Value]) -> Totals
         cells, shortest = _cells(plan, machine, env, frame)
         if not cells:
             nothing = [0.0] * (1 + machine.directions)
-            return Totals(nothing, nothing, nothing)
+            return MovingTotals(nothing, nothing, nothing)
         proof = _proved(plan, cells, values, reach, shortest, rtol)
         if proof is None:
             return None
@@ -258,7 +266,7 @@ def _summed(plan: Straight, machine: Evaluator, env: dict[str, Value]) -> Totals
     return _accurate(totals, _truncation(plan, region, machine.directions, env), machine.rtol, machine.atol)
 
 
-class Settled(Struct, frozen=True, eq=False):
+class SettledRegion(Struct, frozen=True, eq=False):
     """An integral all over a region of its parameters, which run along tangents that stay the same.
 
     box: per parameter, between which numbers. truncation: a bound of what the rule leaves out, of the value and each
@@ -266,15 +274,15 @@ class Settled(Struct, frozen=True, eq=False):
     the function that it stands in for is due.
     """
 
-    plan: Straight
+    plan: StraightIntegral
     region: Region
     machine: Evaluator
     box: tuple[tuple[str, float, float], ...]
     truncation: list[float]
-    faces: list[tuple[Face, Loaded]]
+    faces: list[tuple[RegionPart, Loaded]]
     awaited: Promotion | None
 
-    def at(self, env: dict[str, Any]) -> Totals | None:
+    def at(self, env: dict[str, Any]) -> MovingTotals | None:
         """The value and its tangents; None outside of the region, and where they are not accurate enough."""
         for name, low, high in self.box:
             if not low <= env[name].v <= high:
@@ -292,7 +300,7 @@ class Settled(Struct, frozen=True, eq=False):
 
 
 @np.errstate(all="ignore")
-def settled(plan: Straight, machine: Evaluator, env: dict[str, Value]) -> Settled | None:
+def settled(plan: StraightIntegral, machine: Evaluator, env: dict[str, Value]) -> SettledRegion | None:
     """What is known of the integral for all parameters near these; None where that is not settled, or not yet."""
     plan, values = _decided(plan, machine, env)
     if values is None or machine.frozen or machine.side or machine.costs is not None:
@@ -307,10 +315,14 @@ def settled(plan: Straight, machine: Evaluator, env: dict[str, Value]) -> Settle
     if awaited is not None and awaited.due:
         return None
     box = tuple((name, lo, hi) for name, (lo, hi) in found.box.items())
-    return Settled(plan, region, machine, box, _truncation(plan, region, machine.directions, env), faces or [], awaited)
+    return SettledRegion(
+        plan, region, machine, box, _truncation(plan, region, machine.directions, env), faces or [], awaited
+    )
 
 
-def _decided(plan: Straight, machine: Evaluator, env: dict[str, Value]) -> tuple[Straight, dict[str, float] | None]:
+def _decided(
+    plan: StraightIntegral, machine: Evaluator, env: dict[str, Value]
+) -> tuple[StraightIntegral, dict[str, float] | None]:
     """The plan as these parameters decide its choices, and the parameters, if each is one finite number."""
     values = _numbers(plan, env)
     if values is not None and plan.choices is not None:
@@ -322,7 +334,7 @@ def _decided(plan: Straight, machine: Evaluator, env: dict[str, Value]) -> tuple
     return plan, values
 
 
-def _numbers(plan: Straight, env: Mapping[str, Value]) -> dict[str, float] | None:
+def _numbers(plan: StraightIntegral, env: Mapping[str, Value]) -> dict[str, float] | None:
     """The parameters, if each is one finite number."""
     values: dict[str, float] = {}
     for name in plan.names:
@@ -333,7 +345,7 @@ def _numbers(plan: Straight, env: Mapping[str, Value]) -> dict[str, float] | Non
     return values
 
 
-def _truncation(plan: Straight, region: Region, directions: int, env: Mapping[str, Any]) -> list[float]:
+def _truncation(plan: StraightIntegral, region: Region, directions: int, env: Mapping[str, Any]) -> list[float]:
     """Bounds of what the rule leaves out of the value and of its tangents."""
     bounds = [region.error]
     for d in range(directions):
@@ -346,7 +358,7 @@ def _truncation(plan: Straight, region: Region, directions: int, env: Mapping[st
     return bounds
 
 
-def _accurate(found: Totals, truncation: Sequence[float], rtol: float, atol: float) -> Totals | None:
+def _accurate(found: MovingTotals, truncation: Sequence[float], rtol: float, atol: float) -> MovingTotals | None:
     """The answer, if it is as accurate as was asked for, or as its rounding allows."""
     errors, unit, least, part = [], EPS * max(found.gross), 0.5 * atol, 0.5 * rtol
     for x, rounding, gross, beyond in zip(found.number, found.error, found.gross, truncation, strict=True):
@@ -356,4 +368,4 @@ def _accurate(found: Totals, truncation: Sequence[float], rtol: float, atol: flo
         if not rounding <= asked or not (beyond <= asked or beyond <= NOISE * gross or beyond <= unit):
             return None
         errors.append(rounding + beyond)
-    return Totals(found.number, errors, found.gross, found.nodes)
+    return MovingTotals(found.number, errors, found.gross, found.nodes)

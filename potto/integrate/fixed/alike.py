@@ -16,9 +16,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from potto.integrate.fixed.moving_sums import evaluated
-from potto.integrate.fixed.product_rule import CANCELS, FEW, Rule
+from potto.integrate.fixed.product_rule import CANCELS, FEW, ProductRule
 from potto.integrate.fixed.proved_shapes import proved_rules
-from potto.integrate.fixed.straight import Straight
+from potto.integrate.fixed.straight import StraightIntegral
 from potto.integrate.fixed.topologies import Alike, topologies
 from potto.integrate.pieces import Evaluator, Sums, added_up, gather, together
 from potto.kernels.cells import Array, Bools, Cell, Ints, Value
@@ -39,7 +39,7 @@ ROUNDED = 1e-12
 
 
 def by_shapes(
-    plan: Straight, degrees: Sequence[int | None], machine: Evaluator, env: dict[str, Value], batch: int
+    plan: StraightIntegral, degrees: Sequence[int | None], machine: Evaluator, env: dict[str, Value], batch: int
 ) -> tuple[Bools, Sums] | None:
     """Which members were integrated here, and the sums of all (zero for the others); None if none were: those for which
     cuts have the same formulas together.
@@ -66,7 +66,7 @@ def by_shapes(
 
 
 def _of_one_form(
-    plan: Straight, degrees: Sequence[int | None], machine: Evaluator, env: dict[str, Value], batch: int
+    plan: StraightIntegral, degrees: Sequence[int | None], machine: Evaluator, env: dict[str, Value], batch: int
 ) -> tuple[Bools, Sums] | None:
     """The same where cuts of all have the same formulas."""
     here = {name: env[name] for name in plan.names}
@@ -121,7 +121,7 @@ def _fine(machine: Evaluator, env: dict[str, Value], total: Sequence[Array]) -> 
 
 
 def _settled(
-    plan: Straight, degrees: Sequence[int | None], machine: Evaluator, env: dict[str, Value], cell: Alike,
+    plan: StraightIntegral, degrees: Sequence[int | None], machine: Evaluator, env: dict[str, Value], cell: Alike,
     total: Sequence[Array],
 ) -> Bools:  # fmt: skip
     """Add the integrals over cells of one shape to those of their members; for which of them that could be done."""
@@ -141,7 +141,7 @@ def _settled(
     return fine
 
 
-def _applied(rule: Rule, env: dict[str, Value], todo: Ints, total: Sequence[Array], fine: Bools) -> Ints:
+def _applied(rule: ProductRule, env: dict[str, Value], todo: Ints, total: Sequence[Array], fine: Bools) -> Ints:
     """Add what a rule gives for some of its cells, where it is good enough, and note that; those for which it isn't."""
     step, left = max(1, POINTS // rule.span(env)), []
     if not rule.native(env):
@@ -167,12 +167,17 @@ def _applied(rule: Rule, env: dict[str, Value], todo: Ints, total: Sequence[Arra
 
 
 def _tried(
-    plan: Straight, exact: Sequence[int | None], machine: Evaluator, env: dict[str, Value], cell: Alike, todo: Ints
-) -> list[Rule]:
+    plan: StraightIntegral,
+    exact: Sequence[int | None],
+    machine: Evaluator,
+    env: dict[str, Value],
+    cell: Alike,
+    todo: Ints,
+) -> list[ProductRule]:
     """Rules with ever more nodes: the one that does for a polynomial, or from the one on that does for most cells."""
     known = tuple(n is not None for n in exact)
     tried = [
-        Rule(plan, cell, orders, known, machine)
+        ProductRule(plan, cell, orders, known, machine)
         for order in ORDERS
         if math.prod(orders := tuple(order if n is None else n for n in exact)) <= MOST_NODES
     ]

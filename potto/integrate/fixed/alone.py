@@ -18,11 +18,11 @@ from numpy.typing import NDArray
 from potto.core.terms import Term
 from potto.integrate.fixed.axes import MEAN, Axis, axis
 from potto.integrate.fixed.lowered import LoweredCells, frame_of, lowered_cells
-from potto.integrate.fixed.moving_sums import SUMMED, Totals, summed
+from potto.integrate.fixed.moving_sums import SUMMED, MovingTotals, summed
 from potto.integrate.fixed.product_rule import ELSEWHERE, TRACKED
-from potto.integrate.fixed.straight import Straight
+from potto.integrate.fixed.straight import StraightIntegral
 from potto.integrate.pieces import Evaluator
-from potto.integrate.rules.proved_orders import Cell as Stretch
+from potto.integrate.rules.proved_orders import FrameCell as Stretch
 from potto.integrate.rules.proved_orders import Region
 from potto.kernels.cells import Array, Cell, Ints, Value
 from potto.kernels.making import counts
@@ -58,7 +58,7 @@ class _Layout(Struct):
         return self.out.tolist()  # type: ignore[no-any-return]
 
 
-class Face(Struct, frozen=True):
+class RegionPart(Struct, frozen=True):
     """The cells of a region that have one integrand. idle: layouts that no thread uses right now."""
 
     way: LoweredCells
@@ -85,7 +85,7 @@ class Face(Struct, frozen=True):
         where = address(frame), address(constants)
         return _Layout(reads, constants, out[:, :count], frame, [nobody, *ends], where)
 
-    def summed(self, function: Loaded, env: Mapping[str, Cell]) -> Totals | None:
+    def summed(self, function: Loaded, env: Mapping[str, Cell]) -> MovingTotals | None:
         """The sums over all nodes of the cells; None where cuts cross."""
         try:
             layout = self.idle.pop()
@@ -103,12 +103,12 @@ class Face(Struct, frozen=True):
             number.append(sum(own))
             error.append(share * sum(rows[2 * k1 + d]) + LEFT * most)
             gross.append(most)
-        return Totals(number, error, gross, self.nodes)
+        return MovingTotals(number, error, gross, self.nodes)
 
 
 def summed_alone(
-    plan: Straight, region: Region, machine: Evaluator, env: dict[str, Value], frame: tuple[Cell, ...]
-) -> Totals | None:
+    plan: StraightIntegral, region: Region, machine: Evaluator, env: dict[str, Value], frame: tuple[Cell, ...]
+) -> MovingTotals | None:
     """Weighted sums over the nodes of all cells, by machine code once that pays, else by numpy; None where cuts cross.
 
     frame: the bounds and cuts of the outermost variable.
@@ -121,8 +121,8 @@ def summed_alone(
 
 
 def machine_code(
-    plan: Straight, region: Region, machine: Evaluator, env: Mapping[str, Any]
-) -> list[tuple[Face, Loaded]] | None:
+    plan: StraightIntegral, region: Region, machine: Evaluator, env: Mapping[str, Any]
+) -> list[tuple[RegionPart, Loaded]] | None:
     """The integrands of a region with their functions; none of them where numpy is to be used, None while it is.
 
     For one integral nobody waits for the compiler, whatever the backend: of a swapped shader it is all of the time.
@@ -136,14 +136,14 @@ def machine_code(
     return found if len(found) == len(faces) else [] if of_first.impossible else None
 
 
-def promotion(plan: Straight, region: Region, machine: Evaluator, env: Mapping[str, Any]) -> Promotion:
+def promotion(plan: StraightIntegral, region: Region, machine: Evaluator, env: Mapping[str, Any]) -> Promotion:
     """How far the functions of a region are, all of them as the first."""
     return _faces(plan, region, machine, env)[0].way.promotion
 
 
-def summed_by(faces: Sequence[tuple[Face, Loaded]], env: Mapping[str, Any]) -> Totals | None:
+def summed_by(faces: Sequence[tuple[RegionPart, Loaded]], env: Mapping[str, Any]) -> MovingTotals | None:
     """The sums by machine code; None where cuts cross."""
-    total: Totals | None = None
+    total: MovingTotals | None = None
     for face, function in faces:
         found = face.summed(function, env)
         if found is None:
@@ -153,11 +153,11 @@ def summed_by(faces: Sequence[tuple[Face, Loaded]], env: Mapping[str, Any]) -> T
     return total
 
 
-def _faces(plan: Straight, region: Region, machine: Evaluator, env: Mapping[str, Any]) -> list[Face]:
+def _faces(plan: StraightIntegral, region: Region, machine: Evaluator, env: Mapping[str, Any]) -> list[RegionPart]:
     """The integrands of a region, for parameters that move as these do."""
     kinds = tuple([tuple([None if t is None else t == 1.0 for t in env[name].t]) for name in plan.names])
     key = region, machine.directions, kinds
-    found: list[Face] | None = plan.alone.get(key)
+    found: list[RegionPart] | None = plan.alone.get(key)
     if found is None:
         if len(plan.alone) >= MOST_REGIONS:
             plan.alone.clear()
@@ -169,11 +169,13 @@ def _bodies(region: Region) -> list[Term]:
     return list(dict.fromkeys(cell.body for cell in region.cells))
 
 
-def _face(plan: Straight, region: Region, machine: Evaluator, env: Mapping[str, Any], body: Term) -> Face:
+def _face(plan: StraightIntegral, region: Region, machine: Evaluator, env: Mapping[str, Any], body: Term) -> RegionPart:
     """The cells with one integrand, all by the largest of their orders: what is proved holds for more nodes as well."""
     own = [(cell, order) for cell, order in zip(region.cells, region.outer, strict=True) if cell.body is body]
     cells, orders = zip(*own, strict=True)
     every = max(orders), *region.inner
     nodes = len(cells) * math.prod(every)
     axes = tuple(axis(order, MEAN, (False, False), nodes > TRACKED) for order in every)
-    return Face(lowered_cells(plan, body, machine.directions, env, False), cells, axes, 1 + machine.directions, nodes)
+    return RegionPart(
+        lowered_cells(plan, body, machine.directions, env, False), cells, axes, 1 + machine.directions, nodes
+    )

@@ -20,7 +20,7 @@ import numpy as np
 from msgspec import Struct
 
 from potto.core.terms import Branch, Integral, Term, Tuple, children, postorder
-from potto.integrate.costs import Surface
+from potto.integrate.costs import SurfaceCount
 from potto.integrate.decomposition.root_isolation import flat
 from potto.integrate.fixed.straight import on_sides
 from potto.integrate.pieces import Evaluator, Sums
@@ -162,7 +162,7 @@ def _crossing(body: Term, box: Env, machine: Evaluator) -> tuple[Term, dict[Term
     if len(open_) != 1:
         raise NotAnalytic
     for surface in surfaces if machine.costs is not None else ():
-        seen = machine.costs.surfaces.setdefault(surface, Surface())  # type: ignore[union-attr]
+        seen = machine.costs.surfaces.setdefault(surface, SurfaceCount())  # type: ignore[union-attr]
         seen.met = seen.met or surface is open_[0][0]
         seen.asked = seen.moves = machine.directions > 0
     return open_[0][0], sides, open_[0][1]

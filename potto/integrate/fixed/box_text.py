@@ -14,12 +14,12 @@ from functools import reduce
 from msgspec import Struct
 
 from potto.core.terms import Lam, Term, Tuple, children, function_of
-from potto.integrate.fixed.formula_text import Place, Symbol, still
+from potto.integrate.fixed.formula_text import ParameterPlace, Symbol, still
 from potto.integrate.fixed.rule_text import RuleText
-from potto.integrate.fixed.straight import Straight
+from potto.integrate.fixed.straight import StraightIntegral
 from potto.integrate.pieces import Evaluator
 from potto.integrate.rules.gauss import EPS, gauss
-from potto.integrate.rules.written_intervals import Names, Written
+from potto.integrate.rules.written_intervals import Names, WrittenInterval
 from potto.kernels.native.straight import NotStraight
 
 # How near to 0, of its size, a surface at a corner may be before it counts as crossing.
@@ -42,7 +42,7 @@ class Look(Struct, frozen=True):
     DARK, or from DONE on the number of a face.
     """
 
-    plan: Straight
+    plan: StraightIntegral
     bounds: Lam
     flat: Lam
     curved: tuple[Term, ...]
@@ -69,7 +69,7 @@ class BoxText(RuleText):
         self.look, self.channels = look, sizes.pop() * self.k1
         self.orders, self.exact = orders, exact
 
-    def text(self, places: Sequence[Place]) -> str:
+    def text(self, places: Sequence[ParameterPlace]) -> str:
         at, each = self.at, self.channels
         self.begin()
         self.added = [at.room(n * each) for n in self.orders]
@@ -143,7 +143,7 @@ class BoxText(RuleText):
         """Bounds of the other surfaces."""
         box = {name: Names(symbol.v, symbol.v) for name, symbol in here.items()}
         box |= dict(zip(self.plan.variables, map(Names, self.low, self.high), strict=True))
-        return Written(self.at).walk(self.look.curved, box, {}) if self.look.curved else []
+        return WrittenInterval(self.at).walk(self.look.curved, box, {}) if self.look.curved else []
 
     def among(self, decided: str, sides: Sequence[tuple[str, str]], codes: Sequence[int]) -> str:
         """Whose sides are one of these."""

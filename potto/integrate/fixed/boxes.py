@@ -21,8 +21,8 @@ from potto.calculus.solving.enclosable import enclosable
 from potto.core.kinds import union_of
 from potto.core.terms import Branch, Integral, Lam, Term, function_of, postorder, tuple_
 from potto.integrate.fixed.box_text import NEAR
-from potto.integrate.fixed.straight import MOST_TERMS, Straight
-from potto.integrate.fixed.tensor_product import Bounds, Face
+from potto.integrate.fixed.straight import MOST_TERMS, StraightIntegral
+from potto.integrate.fixed.tensor_product import Bounds, BoxIntegrand
 from potto.integrate.pieces import Evaluator, gather, still
 from potto.integrate.rules.intervals import Interval
 from potto.integrate.rules.lowered_intervals import enclosures
@@ -55,19 +55,19 @@ class Box(Struct, frozen=True, dict=True, eq=False):
     bounds: Lam
     surfaces: tuple[Term, ...]
     flat: int
-    plan: Straight
+    plan: StraightIntegral
     places: tuple[int, ...]
     body: Lam | None
-    faces: dict[int, Face] = {}
+    faces: dict[int, BoxIntegrand] = {}
 
-    def face(self, code: int) -> Face:
+    def face(self, code: int) -> BoxIntegrand:
         """What is integrated where the surfaces are on these sides, a bit for each of the plan's."""
         found = self.faces.get(code)
         if found is None:
             term = self.plan.face(tuple(bool(code >> bit & 1) for bit in range(len(self.places))))
             function = function_of(term) if self.body is None else self.body
             degrees = tuple(degree(term, variable) for variable in self.variables)
-            found = self.faces[code] = Face(self.plan, term, function, degrees)
+            found = self.faces[code] = BoxIntegrand(self.plan, term, function, degrees)
         return found
 
     @cached_property
@@ -130,13 +130,13 @@ def box_of(term: Integral, surfaces: Iterable[Term], body: Lam, inlined: Term) -
                body if large else None)  # fmt: skip
 
 
-def _plan(term: Integral, inlined: Term, decided: tuple[Term, ...]) -> Straight:
+def _plan(term: Integral, inlined: Term, decided: tuple[Term, ...]) -> StraightIntegral:
     frames = tuple(function_of(tuple_(pair)) for pair in term.bounds)
     free = inlined.free.union(*(frame.body.free for frame in frames)) - set(term.variables)
     nothing: tuple[Any, ...] = ((),) * len(frames)
     none = (frozenset[int](),) * len(frames)
     surfaces = function_of(tuple_(decided))
-    return Straight(term.variables, frames, nothing, none, none, inlined, surfaces, tuple(sorted(free)))
+    return StraightIntegral(term.variables, frames, nothing, none, none, inlined, surfaces, tuple(sorted(free)))
 
 
 def sides_of(box: Box, machine: Evaluator, env: dict[str, Value], batch: int) -> Sides | None:

@@ -1,6 +1,7 @@
 """Formulas of the parameters of many members, as LLVM reads them: eight members at a time.
 
-Owns `FormulaText`, on which the texts of product rules, of boxes and of topologies are built, and `Place` and `Symbol`.
+Owns `FormulaText`, on which the texts of product rules, of boxes and of topologies are built, and `ParameterPlace` and
+`Symbol`.
 """
 
 from __future__ import annotations
@@ -12,17 +13,17 @@ from msgspec import Struct
 
 from potto.core.terms import Lam
 from potto.integrate.pieces import Evaluator
-from potto.kernels.native.straight import Flat, NotStraight, Packed, Part, packed
+from potto.kernels.native.straight import ArgumentPart, FlatKernel, NotStraight, Packed, packed
 from potto.kernels.native.vectors import LANES, Vectors
 
 ONE = "1.0"
 
 
-class Place(Struct, frozen=True):
+class ParameterPlace(Struct, frozen=True):
     """A part of a parameter, and what is there: an "array", a "number" for all members, or ONE."""
 
     name: str
-    part: Part
+    part: ArgumentPart
     kind: str
 
 
@@ -38,7 +39,7 @@ class Symbol(Struct, frozen=True):
         moving = tuple(0 if x is None else 1 if x == ONE else 2 for x in self.t)
         return self.e is not None or any(x is not None for x in self.et), moving
 
-    def part(self, part: Part) -> str | None:
+    def part(self, part: ArgumentPart) -> str | None:
         if part.kind in ("v", "e"):
             return self.v if part.kind == "v" else self.e
         return (self.t if part.kind == "t" else self.et)[part.direction]
@@ -71,11 +72,11 @@ class FormulaText:
         self.first = at.once(f"call i64 @llvm.umin.i64(i64 {self.number}, i64 {last})", self.number)
 
     def parameters(
-        self, places: Sequence[Place], start: int, more: int = 0, members: str | None = None
+        self, places: Sequence[ParameterPlace], start: int, more: int = 0, members: str | None = None
     ) -> tuple[Env, list[str]]:
         """The parameters of the members of a block, and so many columns more. start: where the frame tells columns.
         members: whose parameters are asked for, where they are not those of the block."""
-        at, known = self.at, dict[tuple[str, Part], str]()
+        at, known = self.at, dict[tuple[str, ArgumentPart], str]()
         slots = iter(range(start, start + len(places) + more))
         numbers = iter(range(self.reserved, self.reserved + len(places)))
 
@@ -94,12 +95,15 @@ class FormulaText:
             known[place.name, place.part] = found
 
         def parts(name: str, kind: str) -> tuple[str | None, ...]:
-            return tuple(known.get((name, Part((), kind, d))) for d in range(self.k1 - 1))
+            return tuple(known.get((name, ArgumentPart((), kind, d))) for d in range(self.k1 - 1))
 
         names = dict.fromkeys(place.name for place in places)
         return {
             name: Symbol(
-                known[name, Part((), "v")], known.get((name, Part((), "e"))), parts(name, "t"), parts(name, "et")
+                known[name, ArgumentPart((), "v")],
+                known.get((name, ArgumentPart((), "e"))),
+                parts(name, "t"),
+                parts(name, "et"),
             )
             for name in names
         }, [column(None) for _ in range(more)]
@@ -112,7 +116,7 @@ class FormulaText:
         kernel = machine.kernel(function, tuple(arg.pattern() for arg in args))
         if not kernel.plain:
             raise NotStraight(kernel.text)
-        flat = Flat.of(kernel)
+        flat = FlatKernel.of(kernel)
         known = {name: self.plain(args[part.path[0]].part(part)) or self.zero for name, part in flat.parts.items()}
         found = self.at.run(flat.operations, known)
         return [self.symbol(cell, found) for cell in packed(flat.result)]

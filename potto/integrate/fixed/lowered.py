@@ -19,17 +19,17 @@ from numpy.typing import NDArray
 
 from potto.core.terms import Term, postorder
 from potto.integrate.fixed.axes import Axis, Raw
-from potto.integrate.fixed.formula_text import ONE, Place
+from potto.integrate.fixed.formula_text import ONE, ParameterPlace
 from potto.integrate.fixed.mean_text import MeanText
 from potto.integrate.fixed.rule_text import NAME, RuleText
-from potto.integrate.fixed.straight import RowNumbers, Straight
+from potto.integrate.fixed.straight import RowNumbers, StraightIntegral
 from potto.integrate.pieces import Evaluator
 from potto.kernels.cells import Array, Cell, Ints, Value
 from potto.kernels.making import counts
 from potto.kernels.native.objects import Loaded
 from potto.kernels.native.points import address
 from potto.kernels.native.promotion import Promotion
-from potto.kernels.native.straight import Part
+from potto.kernels.native.straight import ArgumentPart
 from potto.kernels.native.vectors import LANES
 
 # Lines of a function's text at the least: in all, and for each term and for its tangent along each direction. There
@@ -43,9 +43,9 @@ class LoweredCells(Struct, frozen=True):
     told: whether coefficients tell what it leaves out; else that is known.
     """
 
-    plan: Straight
+    plan: StraightIntegral
     face: Term
-    places: tuple[Place, ...]
+    places: tuple[ParameterPlace, ...]
     told: bool
     promotion: Promotion
 
@@ -83,7 +83,9 @@ class LoweredCells(Struct, frozen=True):
         return 3 * k1 + (3 if self.told else 1)
 
 
-def lowered_cells(plan: Straight, face: Term, directions: int, env: Mapping[str, Value], told: bool) -> LoweredCells:
+def lowered_cells(
+    plan: StraightIntegral, face: Term, directions: int, env: Mapping[str, Value], told: bool
+) -> LoweredCells:
     """The rule for an integrand on cells, in an environment whose numbers have these parts."""
     places = places_of(plan.names, env)
     key = (face, directions, places, told)
@@ -94,7 +96,7 @@ def lowered_cells(plan: Straight, face: Term, directions: int, env: Mapping[str,
     return found
 
 
-def terms_of(plan: Straight, face: Term) -> int:
+def terms_of(plan: StraightIntegral, face: Term) -> int:
     """How many terms such a rule works out."""
     return sum(len(postorder(term)) for term in (face, *(frame.body for frame in plan.frames)))
 
@@ -118,18 +120,18 @@ def parts(count: int, most: int) -> list[tuple[int, int]]:
     return list(zip(starts, [*starts[1:], count], strict=True))
 
 
-def given(places: Iterable[Place], env: Mapping[str, Value]) -> tuple[Array, list[Array]]:
+def given(places: Iterable[ParameterPlace], env: Mapping[str, Value]) -> tuple[Array, list[Array]]:
     """The parts of parameters that are numbers for all members, and those that differ from member to member."""
     numbers = [_part(env[place.name], place.part) for place in places if place.kind == "number"]
     return np.array(numbers, dtype=float), [_part(env[p.name], p.part) for p in places if p.kind == "array"]
 
 
-def places_of(names: Iterable[str], env: Mapping[str, Value]) -> tuple[Place, ...]:
+def places_of(names: Iterable[str], env: Mapping[str, Value]) -> tuple[ParameterPlace, ...]:
     """The parts of parameters, and what is there."""
-    return tuple(Place(name, part, _kind(part, x)) for name in names for part, x in _parts(env[name]))
+    return tuple(ParameterPlace(name, part, _kind(part, x)) for name in names for part, x in _parts(env[name]))
 
 
-def _kind(part: Part, x: Any) -> str:
+def _kind(part: ArgumentPart, x: Any) -> str:
     return "array" if isinstance(x, np.ndarray) else ONE if part.kind == "t" and x == 1.0 else "number"
 
 
@@ -140,14 +142,16 @@ def _told(axis: Axis) -> list[int]:
     return [len(axis.nodes), axis.transform.shape[1], len(axis.few), *map(address, tables)]
 
 
-def _parts(value: Value) -> list[tuple[Part, Any]]:
+def _parts(value: Value) -> list[tuple[ArgumentPart, Any]]:
     """The parts of a parameter that are something; errors of 0, which seeds of a tape have, are none."""
     assert isinstance(value, Cell)
-    found = [(Part((), "v"), value.v), (Part((), "e"), value.e)]
-    found += [(Part((), kind, d), x) for kind, row in (("t", value.t), ("et", value.et)) for d, x in enumerate(row)]
+    found = [(ArgumentPart((), "v"), value.v), (ArgumentPart((), "e"), value.e)]
+    found += [
+        (ArgumentPart((), kind, d), x) for kind, row in (("t", value.t), ("et", value.et)) for d, x in enumerate(row)
+    ]
     return [(p, x) for p, x in found if x is not None and (p.kind in ("v", "t") or isinstance(x, np.ndarray) or x)]
 
 
-def _part(value: Value, part: Part) -> Any:
+def _part(value: Value, part: ArgumentPart) -> Any:
     found = getattr(value, part.kind)
     return found if part.kind in ("v", "e") else found[part.direction]

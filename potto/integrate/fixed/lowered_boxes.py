@@ -14,7 +14,7 @@ from msgspec import Struct, field
 
 from potto.integrate.fixed.axes import axis
 from potto.integrate.fixed.box_text import CROSSED, DARK, DONE, LEFT, BoxText, Look, numbers, rows_of
-from potto.integrate.fixed.formula_text import Place
+from potto.integrate.fixed.formula_text import ParameterPlace
 from potto.integrate.fixed.lowered import frame_of, given, parts, whole
 from potto.integrate.fixed.rule_text import NAME
 from potto.integrate.pieces import Evaluator, Sums
@@ -54,7 +54,7 @@ class LoweredBoxes(Struct, frozen=True):
     """The function for parameters with these parts, with so many nodes for each variable; exact: for a polynomial."""
 
     look: Look
-    places: tuple[Place, ...]
+    places: tuple[ParameterPlace, ...]
     orders: tuple[int, ...]
     exact: tuple[bool, ...]
     promotion: Promotion = field(default_factory=lambda: Promotion(NAME))

@@ -11,9 +11,9 @@ from collections.abc import Mapping
 import numpy as np
 from msgspec import Struct, field
 
-from potto.integrate.fixed.formula_text import Place
+from potto.integrate.fixed.formula_text import ParameterPlace
 from potto.integrate.fixed.lowered import given, parts, places_of, whole
-from potto.integrate.fixed.straight import ROW_BITS, RowNumbers, Straight
+from potto.integrate.fixed.straight import ROW_BITS, RowNumbers, StraightIntegral
 from potto.integrate.fixed.topology_text import FOUND, NAME, TopologyText
 from potto.integrate.pieces import Evaluator
 from potto.kernels.cells import Bools, Ints, Value
@@ -39,8 +39,8 @@ class Found(Struct, frozen=True):
 class LoweredTopologies(Struct, frozen=True):
     """The function for parameters with these parts."""
 
-    plan: Straight
-    places: tuple[Place, ...]
+    plan: StraightIntegral
+    places: tuple[ParameterPlace, ...]
     promotion: Promotion = field(default_factory=lambda: Promotion(NAME))
 
     def function(self, machine: Evaluator) -> Loaded | None:
@@ -83,7 +83,7 @@ class LoweredTopologies(Struct, frozen=True):
         return rows.reshape(ends // 2, 2, -1)
 
 
-def lowered_topologies(plan: Straight, env: Mapping[str, Value]) -> LoweredTopologies:
+def lowered_topologies(plan: StraightIntegral, env: Mapping[str, Value]) -> LoweredTopologies:
     """The function for an environment whose numbers have these parts."""
     places = places_of(plan.names, env)
     found: LoweredTopologies | None = plan.lowered.get(places)

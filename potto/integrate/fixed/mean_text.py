@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from potto.integrate.fixed.formula_text import Dual, Env, Place
+from potto.integrate.fixed.formula_text import Dual, Env, ParameterPlace
 from potto.integrate.fixed.rule_text import RuleText
 
 
@@ -19,7 +19,7 @@ class MeanText(RuleText):
     off, and whether a cell is clear.
     """
 
-    def text(self, places: Sequence[Place]) -> str:
+    def text(self, places: Sequence[ParameterPlace]) -> str:
         self.begin()
         here = self.cells(places)
         number = self.mean(0, here)

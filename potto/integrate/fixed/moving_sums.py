@@ -1,9 +1,9 @@
 """Sums over the nodes of cells whose ends are formulas: values and tangents, with the rounding of both.
 
-Owns `summed`, `product`, `Totals` and `evaluated`. Nodes move with the ends of their cells, so that the tangent of the
-sum is the derivative of the integral. Blocks of numbers have values in row 0 and tangents in rows 1 ... k of their
-first axis; the nodes of the variables, (P, n2, n3), are their last axes: P those of the outermost variable, cell after
-cell.
+Owns `summed`, `product`, `MovingTotals` and `evaluated`. Nodes move with the ends of their cells, so that the tangent
+of the sum is the derivative of the integral. Blocks of numbers have values in row 0 and tangents in rows 1 ... k of
+their first axis; the nodes of the variables, (P, n2, n3), are their last axes: P those of the outermost variable, cell
+after cell.
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ def _layout(region: Region) -> _Layout:
     )
 
 
-class Totals(Struct, frozen=True):
+class MovingTotals(Struct, frozen=True):
     """Values and tangents (1 + k,), how far rounding puts each off, and what each is when nothing cancels; evaluations
     of the integrand."""
 
@@ -79,16 +79,16 @@ class Totals(Struct, frozen=True):
     gross: list[float]
     nodes: int = 0
 
-    def plus(self, other: Totals) -> Totals:
+    def plus(self, other: MovingTotals) -> MovingTotals:
         mine, theirs = (self.number, self.error, self.gross), (other.number, other.error, other.gross)
         number, error, gross = ([x + y for x, y in zip(a, b, strict=True)] for a, b in zip(mine, theirs, strict=True))
-        return Totals(number, error, gross, self.nodes + other.nodes)
+        return MovingTotals(number, error, gross, self.nodes + other.nodes)
 
 
 def summed(
     variables: Sequence[str], frames: Sequence[Lam], region: Region, machine: Evaluator, env: dict[str, Value],
     frame: tuple[Cell, ...], put: Put | None = None,
-) -> Totals | None:  # fmt: skip
+) -> MovingTotals | None:  # fmt: skip
     """Weighted sums over the nodes of all cells: value and tangents, with their rounding. None where cuts cross.
 
     frames: per variable its bounds and cuts, as functions of what is further out; `frame` has the values of the first.
@@ -207,7 +207,7 @@ def _integrand(layout: _Layout, machine: Evaluator, here: dict[str, Value], shap
     return out
 
 
-def _added(values: Array, length: Array, rounded: Array, nodes: int) -> Totals:
+def _added(values: Array, length: Array, rounded: Array, nodes: int) -> MovingTotals:
     """Sums over nodes of the integrand (3, 1 + k, P, ...) times the lengths (1 + k, P, ...) with their weights."""
     k1 = len(length)
     factors = np.concatenate((length, np.abs(length), rounded)).reshape(3 * k1, -1)
@@ -220,4 +220,4 @@ def _added(values: Array, length: Array, rounded: Array, nodes: int) -> Totals:
 
     gross = ruled(2, 1)
     off = zip(ruled(1, 1), ruled(2, 2), gross, strict=True)
-    return Totals(ruled(0, 0), [a + b + SUMMED * c for a, b, c in off], gross, nodes)
+    return MovingTotals(ruled(0, 0), [a + b + SUMMED * c for a, b, c in off], gross, nodes)

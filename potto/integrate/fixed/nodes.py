@@ -16,7 +16,7 @@ from potto.core.terms import Term, function_of, tuple_
 from potto.integrate.fixed.axes import ENDS, Axis, Raw
 from potto.integrate.fixed.edges import EDGE, edges_of
 from potto.integrate.fixed.moving_sums import evaluated, product
-from potto.integrate.fixed.straight import RowNumbers, Straight
+from potto.integrate.fixed.straight import RowNumbers, StraightIntegral
 from potto.integrate.pieces import Evaluator, dense, still
 from potto.integrate.rules.gauss import EPS
 from potto.kernels.cells import Array, Bools, Cell, Ints, Value, map_arrays
@@ -43,7 +43,7 @@ class Nodes(Struct, frozen=True):
 
 
 def at_once(
-    plan: Straight, face: Term, machine: Evaluator, env: Mapping[str, Value], members: Ints, rows: RowNumbers,
+    plan: StraightIntegral, face: Term, machine: Evaluator, env: Mapping[str, Value], members: Ints, rows: RowNumbers,
     axes: Sequence[Axis],
 ) -> Raw:  # fmt: skip
     """The sums over cells. members: (M,), whose they are; rows: (variables, 2, M), of the frames, between which."""
@@ -66,7 +66,7 @@ def at_once(
 
 
 class _Cells(Struct, frozen=True):
-    plan: Straight
+    plan: StraightIntegral
     face: Term
     env: dict[str, Value]
     rows: RowNumbers

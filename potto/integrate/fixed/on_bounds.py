@@ -17,7 +17,7 @@ import numpy as np
 from msgspec import Struct
 
 from potto.integrate.events import TwoSided
-from potto.integrate.fixed.straight import CLEAR, Straight
+from potto.integrate.fixed.straight import CLEAR, StraightIntegral
 from potto.integrate.pieces import Sums
 from potto.kernels.cells import Cell, Number
 
@@ -55,7 +55,7 @@ class OnBounds(Struct):
         """Whether all cuts that move lie, as computed, where they are before the parameters have come here."""
         return all(within == (rate < 0) for _, rate, within in self.met.values() if rate)
 
-    def causes(self, plan: Straight) -> tuple[TwoSided, ...]:
+    def causes(self, plan: StraightIntegral) -> tuple[TwoSided, ...]:
         """The surfaces that jump there and move."""
         found = {
             TwoSided(plan.variables[i], surface): None
@@ -76,7 +76,7 @@ class OnBounds(Struct):
         return tuple(cells)
 
     def stretches(
-        self, plan: Straight, i: int, values: Sequence[Cell], places: Sequence[Place], kept: Sequence[Place]
+        self, plan: StraightIntegral, i: int, values: Sequence[Cell], places: Sequence[Place], kept: Sequence[Place]
     ) -> list[tuple[int, int, float, float]] | None:
         """What a variable runs along, from bound to bound by the cuts that are inside: rows, middle, length. None where
         cuts lie on one another, or what lies on a bound is not plain."""
@@ -105,7 +105,7 @@ class OnBounds(Struct):
             found.append((cut_row, 1, x + step, 0.0) if number else (0, cut_row, x - step, 0.0))
         return found
 
-    def _lies_on(self, plan: Straight, i: int, values: Sequence[Cell], cut: Place, bound: Place) -> bool:
+    def _lies_on(self, plan: StraightIntegral, i: int, values: Sequence[Cell], cut: Place, bound: Place) -> bool:
         """Whether it is plain how a cut on a bound moves, the same for all of the variables further out; it is kept."""
         end, row = bound[2], cut[2]
         if end in plan.shared[i]:  # beyond it other surfaces have another side

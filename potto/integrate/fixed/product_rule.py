@@ -1,7 +1,7 @@
 """One product rule for cells of one shape, whoever's they are, and how far off it is.
 
-Owns `Rule` and `Measured`. What the nodes amount to is worked out by numpy, or by machine code once that pays; what
-follows from it is said here.
+Owns `ProductRule` and `Measured`. What the nodes amount to is worked out by numpy, or by machine code once that pays;
+what follows from it is said here.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from potto.integrate.fixed.axes import MEAN, Raw, axis
 from potto.integrate.fixed.lowered import LoweredCells, lowered_cells
 from potto.integrate.fixed.moving_sums import SUMMED
 from potto.integrate.fixed.nodes import at_once
-from potto.integrate.fixed.straight import Straight
+from potto.integrate.fixed.straight import StraightIntegral
 from potto.integrate.fixed.topologies import Alike
 from potto.integrate.pieces import Evaluator
 from potto.integrate.rules.gauss import analytic_truncation, telling
@@ -45,14 +45,14 @@ class Measured(Struct, frozen=True):
     gross: Array
 
 
-class Rule(Struct, frozen=True):
+class ProductRule(Struct, frozen=True):
     """A product rule for cells of one shape, with so many nodes for each variable.
 
     exact: the variables whose coefficients need not tell what it leaves out, as of polynomials. beyond: what is proved
     that it leaves out of each cell, (1 + k, cells).
     """
 
-    plan: Straight
+    plan: StraightIntegral
     cell: Alike
     orders: tuple[int, ...]
     exact: tuple[bool, ...]
@@ -85,7 +85,7 @@ class Rule(Struct, frozen=True):
         """The integrals over some of the cells."""
         return self._measured(self._raw(env, index, self.asked), index, self.orders)
 
-    def foreseen(self, env: dict[str, Value], index: Ints, others: Sequence[Rule]) -> Iterator[Bools]:
+    def foreseen(self, env: dict[str, Value], index: Ints, others: Sequence[ProductRule]) -> Iterator[Bools]:
         """For which cells rules with no more nodes than this one would do, by its coefficients."""
         every = zip(self.orders, self.exact, strict=True)
         raw = self._raw(env, index, [MEAN if exact else tuple(range(order)) for order, exact in every])

@@ -17,12 +17,12 @@ import numpy as np
 from msgspec import Struct
 
 from potto.integrate.columns import distinct
-from potto.integrate.fixed.product_rule import Rule
+from potto.integrate.fixed.product_rule import ProductRule
 from potto.integrate.fixed.regions import LOOSEST, MARGIN, MOST_REGIONS
-from potto.integrate.fixed.straight import Straight
+from potto.integrate.fixed.straight import StraightIntegral
 from potto.integrate.fixed.topologies import Alike
 from potto.integrate.pieces import Evaluator
-from potto.integrate.rules.proved_orders import Cell as Stretch
+from potto.integrate.rules.proved_orders import FrameCell as Stretch
 from potto.integrate.rules.proved_orders import proved_of_each
 from potto.kernels.cells import Array, Cell, Ints, Number, Value
 from potto.kernels.making import making
@@ -52,8 +52,8 @@ class _Grid(Struct, frozen=True):
 
 
 def proved_rules(
-    plan: Straight, exact: Sequence[int | None], machine: Evaluator, env: dict[str, Value], cell: Alike
-) -> tuple[list[tuple[Rule, Ints]], Ints]:
+    plan: StraightIntegral, exact: Sequence[int | None], machine: Evaluator, env: dict[str, Value], cell: Alike
+) -> tuple[list[tuple[ProductRule, Ints]], Ints]:
     """Rules with the cells that they are for, and the cells for which there are none.
 
     exact: the nodes of variables in which the integrand is a polynomial.
@@ -86,7 +86,7 @@ def proved_rules(
         beyond[1 + d, index] = error * _speed(grid, env, members, d)
     exactly = (True,) * len(plan.variables)
     parts = _shared(nodes)
-    rules = [(Rule(plan, cell, orders, exactly, machine, beyond), index[own]) for orders, own in parts.items()]
+    rules = [(ProductRule(plan, cell, orders, exactly, machine, beyond), index[own]) for orders, own in parts.items()]
     return rules, index[nodes[0] == 0]
 
 
@@ -96,7 +96,7 @@ def _stretch(cell: Alike, number: int) -> Stretch:
     return Stretch(tuple((low, high) for low, high in rows), cell.face)
 
 
-def _names(plan: Straight, groups: Sequence[tuple[int, int, Stretch]]) -> list[str]:
+def _names(plan: StraightIntegral, groups: Sequence[tuple[int, int, Stretch]]) -> list[str]:
     """The parameters of some cells."""
     stretches = [stretch for _, _, stretch in groups]
     ends = {plan.items[i][row] for stretch in stretches for i, pair in enumerate(stretch.rows) for row in pair}
@@ -195,7 +195,7 @@ def _regions(values: dict[str, Number], grid: _Grid, cells: int) -> tuple[Ints, 
 
 
 def _orders(
-    plan: Straight, stretch: Stretch, exact: Sequence[int | None], grid: _Grid, places: Ints, tolerance: float
+    plan: StraightIntegral, stretch: Stretch, exact: Sequence[int | None], grid: _Grid, places: Ints, tolerance: float
 ) -> tuple[Ints, Array]:
     """Nodes per variable and region (D, R), and bounds of the error (R,): proved once."""
     known: dict[tuple[int, ...], tuple[tuple[int, ...], float]]

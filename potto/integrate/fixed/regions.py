@@ -13,9 +13,9 @@ from collections.abc import Iterator, Mapping
 from msgspec import Struct
 
 from potto.core.terms import Const, children
-from potto.integrate.fixed.straight import Straight
+from potto.integrate.fixed.straight import StraightIntegral
 from potto.integrate.rules.intervals import Interval, enclosure
-from potto.integrate.rules.proved_orders import Cell as Stretch
+from potto.integrate.rules.proved_orders import FrameCell as Stretch
 from potto.integrate.rules.proved_orders import Region, proved
 from potto.kernels.making import making
 
@@ -49,7 +49,7 @@ def _around(values: Mapping[str, float], size: Mapping[str, float], part: int = 
     return tuple(places)
 
 
-def _all_over(plan: Straight, of_parameters: Mapping[str, Interval]) -> tuple[Stretch, ...] | None:
+def _all_over(plan: StraightIntegral, of_parameters: Mapping[str, Interval]) -> tuple[Stretch, ...] | None:
     """The cells that there are all over a box; None where they may not be the same, or cuts be close together, or have
     other formulas."""
     box = dict(of_parameters)
@@ -84,7 +84,12 @@ def _all_over(plan: Straight, of_parameters: Mapping[str, Interval]) -> tuple[St
 
 
 def region_of(
-    plan: Straight, cells: tuple[Stretch, ...], values: Mapping[str, float], reach: float, shortest: float, rtol: float
+    plan: StraightIntegral,
+    cells: tuple[Stretch, ...],
+    values: Mapping[str, float],
+    reach: float,
+    shortest: float,
+    rtol: float,
 ) -> tuple[Region, Places] | None:
     """What is known of the rules for these cells, in the region in which the parameters lie; proved once.
 
@@ -130,7 +135,7 @@ def _parts(values: Mapping[str, float], reach: float) -> Iterator[Places]:
                 yield places
 
 
-def known(plan: Straight, values: Mapping[str, float], reach: float, rtol: float) -> Settlement | None:
+def known(plan: StraightIntegral, values: Mapping[str, float], reach: float, rtol: float) -> Settlement | None:
     """What is settled about these parameters."""
     for places in _parts(values, reach):
         found: Settlement | None = plan.settled.get((places, rtol))
@@ -140,7 +145,7 @@ def known(plan: Straight, values: Mapping[str, float], reach: float, rtol: float
 
 
 def settle(
-    plan: Straight, region: Region, proved_in: Places, values: Mapping[str, float], reach: float, rtol: float
+    plan: StraightIntegral, region: Region, proved_in: Places, values: Mapping[str, float], reach: float, rtol: float
 ) -> None:
     """Keep what was proved of a region, for the largest part of it about these parameters that has the same cells all
     over; of larger ones that they have not."""

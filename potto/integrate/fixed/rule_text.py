@@ -15,8 +15,8 @@ import numpy as np
 from potto.core.terms import Term, function_of
 from potto.integrate.fixed.axes import ENDS
 from potto.integrate.fixed.edges import EDGE, edges_of
-from potto.integrate.fixed.formula_text import Dual, Env, FormulaText, Place, Symbol, still
-from potto.integrate.fixed.straight import Straight
+from potto.integrate.fixed.formula_text import Dual, Env, FormulaText, ParameterPlace, Symbol, still
+from potto.integrate.fixed.straight import StraightIntegral
 from potto.integrate.pieces import Evaluator
 from potto.integrate.rules.gauss import EPS
 from potto.kernels.native.elementary import module
@@ -34,13 +34,13 @@ class RuleText(FormulaText):
     for every member, and the rows of the ends of cells.
     """
 
-    def __init__(self, plan: Straight, face: Term, machine: Evaluator) -> None:
+    def __init__(self, plan: StraightIntegral, face: Term, machine: Evaluator) -> None:
         super().__init__(machine)
         self.plan = plan
         self.face, self.edges = function_of(face), [function_of(edge) for edge in edges_of(face)]
         self.channels = self.k1
 
-    def text(self, places: Sequence[Place]) -> str:
+    def text(self, places: Sequence[ParameterPlace]) -> str:
         at, k1 = self.at, self.k1
         self.begin()
         self.added = [at.room(at.whole("mul", table[1], k1)) for table in self.tables]
@@ -56,7 +56,7 @@ class RuleText(FormulaText):
         self.told([*number, *sizes, *off, at.load(self.clear), at.load(corners), at.load(largest)], k1)
         return self.end()
 
-    def cells(self, places: Sequence[Place]) -> Env:
+    def cells(self, places: Sequence[ParameterPlace]) -> Env:
         """The parameters of the cells of a block, which are clear so far; between which rows they lie is noted."""
         at, start = self.at, self.columns
         self.clear = at.room(1)

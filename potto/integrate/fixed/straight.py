@@ -1,8 +1,8 @@
 """An integral between known cuts as a short program: bounds and cuts, the nodes between them, the integrand, sums.
 
-Owns `Straight` and `straight`: the terms of an integral all of whose cuts are closed forms, and whose integrand is one
-analytic formula on every cell between them. How many nodes do is proved in `a_priori` for one set of parameters, and
-told by coefficients in `alike` for many.
+Owns `StraightIntegral` and `straight`: the terms of an integral all of whose cuts are closed forms, and whose integrand
+is one analytic formula on every cell between them. How many nodes do is proved in `a_priori` for one set of parameters,
+and told by coefficients in `alike` for many.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ RowNumbers = NDArray[np.integer[Any]]  # numbers of rows of frames
 CLEAR = 64.0
 
 
-class Straight(Struct, frozen=True, dict=True, eq=False):
+class StraightIntegral(Struct, frozen=True, dict=True, eq=False):
     """The terms of an integral for this way: frames per variable (bounds, then cuts), the integrand without calls.
 
     jumps: per variable the surfaces that it crosses, with the rows of the frame that are their places. turning: the
@@ -72,7 +72,7 @@ class Straight(Struct, frozen=True, dict=True, eq=False):
     settled: dict[Any, Any] = {}
     choices: Lam | None = None
     held: tuple[tuple[Term, bool], ...] = ()
-    plans: dict[tuple[bool, ...], Straight] = {}
+    plans: dict[tuple[bool, ...], StraightIntegral] = {}
 
     @cached_property
     def items(self) -> tuple[tuple[Term, ...], ...]:
@@ -86,7 +86,7 @@ class Straight(Struct, frozen=True, dict=True, eq=False):
             found = self.faces[sides] = on_sides(self.body, side)
         return found
 
-    def decided(self, sides: tuple[bool, ...]) -> Straight:
+    def decided(self, sides: tuple[bool, ...]) -> StraightIntegral:
         """The plan with the formulas that cuts have where choices fall like this."""
         assert self.choices is not None
         found = self.plans.get(sides)
@@ -96,7 +96,7 @@ class Straight(Struct, frozen=True, dict=True, eq=False):
         return found
 
 
-def straight(term: Integral, body: Term, levels: Sequence[LevelPlan]) -> Straight | None:
+def straight(term: Integral, body: Term, levels: Sequence[LevelPlan]) -> StraightIntegral | None:
     """The terms for this way; None if a cut has no closed form, or the integrand no formula that can be bounded.
 
     body: the integrand with calls carried out.
@@ -130,7 +130,7 @@ def straight(term: Integral, body: Term, levels: Sequence[LevelPlan]) -> Straigh
         for level, place in zip(levels, places, strict=True)
     )
     shared = tuple(frozenset(place[row] for row in place if row > 1) & {0, 1} for place in places)
-    return Straight(
+    return StraightIntegral(
         term.variables, frames, jumps, turning, shared, body, function_of(tuple_(surfaces)), tuple(sorted(free)),
         choices=function_of(tuple_(choices)) if choices else None,
     )  # fmt: skip
@@ -162,7 +162,7 @@ def _chosen(term: Term, sides: Mapping[Term, bool | None]) -> Term:
     return memo[term]
 
 
-def _with_choices(plan: Straight, held: tuple[tuple[Term, bool], ...]) -> Straight:
+def _with_choices(plan: StraightIntegral, held: tuple[tuple[Term, bool], ...]) -> StraightIntegral:
     """The plan where choices fall like this; formulas that are the same then are one cut."""
     places, frames = zip(*(_distinct(function_of(_chosen(tuple_(items), dict(held)))) for items in plan.items),
                          strict=True)  # fmt: skip
@@ -175,7 +175,7 @@ def _with_choices(plan: Straight, held: tuple[tuple[Term, bool], ...]) -> Straig
     shared = tuple(own | more for own, more in zip(plan.shared, both, strict=True))
     free = plan.body.free.union(*(frame.body.free for frame in frames)) - set(plan.variables)
     names = tuple(sorted(free))
-    return Straight(plan.variables, frames, jumps, turning, shared, plan.body, plan.surfaces, names, held=held)
+    return StraightIntegral(plan.variables, frames, jumps, turning, shared, plan.body, plan.surfaces, names, held=held)
 
 
 def nothing(face: Term) -> bool:

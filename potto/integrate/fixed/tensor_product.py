@@ -1,8 +1,8 @@
 """A product of Gauss rules over boxes that nothing cuts, by numpy.
 
-Owns `Face` and `integrated`. Of a polynomial the rule takes as many nodes per variable as its degree asks for; of
-anything else few, then more where the Legendre coefficients say that these were not enough. All nodes of so many boxes
-are evaluated at once. (`lowered_boxes` does the same by machine code.)
+Owns `BoxIntegrand` and `integrated`. Of a polynomial the rule takes as many nodes per variable as its degree asks for;
+of anything else few, then more where the Legendre coefficients say that these were not enough. All nodes of so many
+boxes are evaluated at once. (`lowered_boxes` does the same by machine code.)
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from msgspec import Struct
 from potto.core.terms import Lam, Term
 from potto.integrate.columns import run_of
 from potto.integrate.fixed.box_text import NODE_ROUNDING
-from potto.integrate.fixed.straight import Straight
+from potto.integrate.fixed.straight import StraightIntegral
 from potto.integrate.pieces import Evaluator, Sums, components, gather
 from potto.integrate.rules.gauss import EPS, gauss, truncation
 from potto.kernels.cells import Array, Bools, Cell, Ints, Value
@@ -28,13 +28,13 @@ ORDERS = (4, 8)
 POINTS = 1 << 16
 
 
-class Face(Struct, frozen=True, dict=True, eq=False):
+class BoxIntegrand(Struct, frozen=True, dict=True, eq=False):
     """What is integrated over a box: a term over variables and parameters, and a function that gives its values.
 
     plan: of what it is a side. degrees: of the term in each variable, where it is a polynomial in it.
     """
 
-    plan: Straight
+    plan: StraightIntegral
     term: Term
     function: Lam
     degrees: tuple[int | None, ...]
@@ -69,7 +69,7 @@ class Means(Struct, frozen=True):
 
 
 def integrated(
-    face: Face, machine: Evaluator, env: dict[str, Value], index: Ints, bounds: Bounds
+    face: BoxIntegrand, machine: Evaluator, env: dict[str, Value], index: Ints, bounds: Bounds
 ) -> Iterator[tuple[Ints, Sums]]:
     """The integrals over those boxes that a rule does for, some at a time: which, and their sums.
 
@@ -105,7 +105,7 @@ def _tensor(orders: tuple[int, ...]) -> tuple[tuple[Array, ...], tuple[Array, ..
 
 
 def _at_nodes(
-    face: Face, machine: Evaluator, env: dict[str, Value], bounds: Bounds, orders: tuple[int, ...]
+    face: BoxIntegrand, machine: Evaluator, env: dict[str, Value], bounds: Bounds, orders: tuple[int, ...]
 ) -> tuple[Sums, Bools]:
     """A rule at all of its nodes at once, and for which boxes it does."""
     low, size = bounds.low, bounds.high - bounds.low
@@ -131,7 +131,7 @@ def _at_nodes(
 
 
 def _means(
-    face: Face, machine: Evaluator, env: dict[str, Value], low: Array, size: Array, orders: tuple[int, ...]
+    face: BoxIntegrand, machine: Evaluator, env: dict[str, Value], low: Array, size: Array, orders: tuple[int, ...]
 ) -> Means:
     """What the nodes of a rule amount to."""
     nodes, weights = _tensor(orders)

@@ -19,7 +19,7 @@ from potto.core.terms import Term, children
 from potto.integrate.columns import distinct
 from potto.integrate.fixed.lowered_topologies import Found, lowered_topologies
 from potto.integrate.fixed.moving_sums import evaluated
-from potto.integrate.fixed.straight import CLEAR, ROW_BITS, RowNumbers, Straight, nothing
+from potto.integrate.fixed.straight import CLEAR, ROW_BITS, RowNumbers, StraightIntegral, nothing
 from potto.integrate.fixed.topology_text import FARTHEST
 from potto.integrate.pieces import Evaluator, gather
 from potto.kernels.cells import Array, Bools, Cell, Ints, Number, Value
@@ -65,7 +65,9 @@ class _Cells(Struct):
         return _Cells(self.rows.take(index, -1), self.members.take(index), gather(env, index))
 
 
-def topologies(plan: Straight, machine: Evaluator, env: dict[str, Value], batch: int) -> tuple[Bools, list[Alike]]:
+def topologies(
+    plan: StraightIntegral, machine: Evaluator, env: dict[str, Value], batch: int
+) -> tuple[Bools, list[Alike]]:
     """Which members are plain, and all cells of these, by what is integrated over them."""
     moving = machine.costs is not None  # then it is told how surfaces move
     tracking = (machine if moving else machine.with_directions(0)).tracking()
@@ -77,7 +79,9 @@ def topologies(plan: Straight, machine: Evaluator, env: dict[str, Value], batch:
     return found.plain, _gathered(plan, machine, found)
 
 
-def _by_either(plan: Straight, machine: Evaluator, env: dict[str, Value], here: dict[str, Value], batch: int) -> Found:
+def _by_either(
+    plan: StraightIntegral, machine: Evaluator, env: dict[str, Value], here: dict[str, Value], batch: int
+) -> Found:
     """By machine code, if that is to be used now, or by numpy."""
     way = lowered_topologies(plan, {name: Cell(cell.v, cell.e) for name, cell in env.items() if isinstance(cell, Cell)})
     function = way.function(machine)
@@ -87,7 +91,7 @@ def _by_either(plan: Straight, machine: Evaluator, env: dict[str, Value], here: 
         return _found(plan, machine, here, batch)
 
 
-def _found(plan: Straight, machine: Evaluator, here: dict[str, Value], batch: int) -> Found:
+def _found(plan: StraightIntegral, machine: Evaluator, here: dict[str, Value], batch: int) -> Found:
     """All cells of plain members, by numpy: for one variable after the other, those of all members at once."""
     plain = np.ones(batch, dtype=bool)
     cells = _Cells(np.empty((0, 2, batch), dtype=np.int64), np.arange(batch), here)
@@ -98,7 +102,7 @@ def _found(plan: Straight, machine: Evaluator, here: dict[str, Value], batch: in
     return Found(plain, cells.rows.take(kept, -1), cells.members.take(kept), sides.take(kept))
 
 
-def _along(plan: Straight, i: int, machine: Evaluator, cells: _Cells, plain: Bools) -> _Cells:
+def _along(plan: StraightIntegral, i: int, machine: Evaluator, cells: _Cells, plain: Bools) -> _Cells:
     """The stretches of one variable more, within those so far."""
     frame = plan.frames[i]
     values = evaluated(frame, machine, {name: cells.env[name] for name in frame.params})
@@ -121,7 +125,7 @@ def _along(plan: Straight, i: int, machine: Evaluator, cells: _Cells, plain: Boo
     return inner
 
 
-def _sides(plan: Straight, machine: Evaluator, cells: _Cells, plain: Bools) -> Ints:
+def _sides(plan: StraightIntegral, machine: Evaluator, cells: _Cells, plain: Bools) -> Ints:
     """A number per cell whose bits are the sides of the surfaces in its middle."""
     surfaces, codes = plan.surfaces, np.zeros(cells.members.size, dtype=np.int64)
     if children(surfaces.body):
@@ -133,7 +137,7 @@ def _sides(plan: Straight, machine: Evaluator, cells: _Cells, plain: Bools) -> I
     return codes
 
 
-def _gathered(plan: Straight, machine: Evaluator, cells: Found) -> list[Alike]:
+def _gathered(plan: StraightIntegral, machine: Evaluator, cells: Found) -> list[Alike]:
     """The cells by what is integrated over them, which several combinations of sides may lead to (of a union each but
     one), and by which ends of their stretches are like square roots."""
     count, found, sides = len(plan.variables), [], cells.sides

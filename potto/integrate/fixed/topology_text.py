@@ -14,8 +14,8 @@ import numpy as np
 from msgspec import Struct
 
 from potto.core.terms import children
-from potto.integrate.fixed.formula_text import Env, FormulaText, Place, Symbol
-from potto.integrate.fixed.straight import CLEAR, ROW_BITS, Straight
+from potto.integrate.fixed.formula_text import Env, FormulaText, ParameterPlace, Symbol
+from potto.integrate.fixed.straight import CLEAR, ROW_BITS, StraightIntegral
 from potto.integrate.pieces import Evaluator
 from potto.kernels.native.elementary import module
 from potto.kernels.native.straight import NotStraight
@@ -43,13 +43,13 @@ class Ordered(Struct, frozen=True):
 class TopologyText(FormulaText):
     """Writes the function. The cells of eight members are put down side by side; who has none there has no sides."""
 
-    def __init__(self, plan: Straight, machine: Evaluator) -> None:
+    def __init__(self, plan: StraightIntegral, machine: Evaluator) -> None:
         super().__init__(machine)
         self.plan = plan
         if len(children(plan.surfaces.body)) > MOST_SIDES:
             raise NotStraight("more surfaces than a number has bits")
 
-    def text(self, places: Sequence[Place]) -> str:
+    def text(self, places: Sequence[ParameterPlace]) -> str:
         at = self.at
         self.block()
         self.sure = at.at(at.address("%frame", PLAIN, "ptr"), self.first, "double")

@@ -20,7 +20,7 @@ from potto.integrate.fixed.boxes import UNCLEAR, Box, Sides, sides_of
 from potto.integrate.fixed.lowered import places_of
 from potto.integrate.fixed.lowered_boxes import LoweredBoxes, Passed
 from potto.integrate.fixed.straight import nothing
-from potto.integrate.fixed.tensor_product import ORDERS, Face, integrated
+from potto.integrate.fixed.tensor_product import ORDERS, BoxIntegrand, integrated
 from potto.integrate.pieces import Evaluator, Sums, gather
 from potto.kernels.cells import Array, Cell, Ints, Value
 
@@ -69,7 +69,7 @@ def _by_faces(
 
 
 def _of_face(
-    box: Box, face: Face, sides: Sides, machine: Evaluator, env: dict[str, Value], index: Ints, able: bool
+    box: Box, face: BoxIntegrand, sides: Sides, machine: Evaluator, env: dict[str, Value], index: Ints, able: bool
 ) -> Iterator[tuple[Ints, Sums]]:  # fmt: skip
     """The integrals over those boxes with one integrand that a rule does for."""
     ways = _told(box, face, machine, env) if able else ()
@@ -110,14 +110,14 @@ def _deciding(box: Box, machine: Evaluator, env: dict[str, Value]) -> tuple[Lowe
     return _ways(box, machine, env, look, [box.face(codes[0]) for codes in faces.values()])
 
 
-def _told(box: Box, face: Face, machine: Evaluator, env: dict[str, Value]) -> tuple[LoweredBoxes, ...]:
+def _told(box: Box, face: BoxIntegrand, machine: Evaluator, env: dict[str, Value]) -> tuple[LoweredBoxes, ...]:
     """The functions for one integrand, which are told where it is one."""
     look = Look(box.plan, box.bounds, function_of(tuple_(())), (), (), ((face.term, ()),), True)
     return _ways(box, machine, env, look, [face])
 
 
 def _ways(
-    box: Box, machine: Evaluator, env: dict[str, Value], look: Look, faces: Sequence[Face]
+    box: Box, machine: Evaluator, env: dict[str, Value], look: Look, faces: Sequence[BoxIntegrand]
 ) -> tuple[LoweredBoxes, ...]:  # fmt: skip
     """The functions that go for it, with few nodes and with more; none where that is impossible."""
     places = places_of(box.names, env)

@@ -27,7 +27,7 @@ import numpy as np
 from msgspec import Struct
 
 from potto.calculus.algebra.degree import plane
-from potto.calculus.decomposition.surface_cuts import Face, Product
+from potto.calculus.decomposition.surface_cuts import Product, WrittenSurface
 from potto.core.terms import Term, const, function_of, mul, sub, var
 from potto.integrate.decomposition.cuts import frame_rows
 from potto.integrate.decomposition.meetings import Row, as_array
@@ -77,7 +77,7 @@ def factors(plan: Plan, drawn: int) -> list[tuple[Term, int, tuple[tuple[int, Te
     return [(term, level, tuple(forces)) for term, level, forces in found.values()]
 
 
-def _rest(product: Product, factor: Face | None) -> Term:
+def _rest(product: Product, factor: WrittenSurface | None) -> Term:
     """A product without one of its outer factors, or without what varies along its variable."""
     rest = [f.form for f in product.outer if f != factor]
     return mul(const(product.sign), *rest, *(() if factor is None else (product.along,)))

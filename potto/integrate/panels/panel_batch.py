@@ -20,7 +20,7 @@ from potto.integrate.panels.mending import mend
 from potto.integrate.panels.roundoff import few_doubles, misplaced, noise, note_ends, shake, share, together
 from potto.integrate.pieces import Crossing, Ends, Evaluator, Pieces, Sums, all_of, column, dense, gather, still, take
 from potto.integrate.rules import substitution
-from potto.integrate.rules.gauss import EPS, Rule, gauss, truncation
+from potto.integrate.rules.gauss import EPS, GaussRule, gauss, truncation
 from potto.integrate.rules.substitution import Segments
 from potto.kernels.cells import Array, Bools, Cell, Ints, Mask, Number, Value, pad
 
@@ -136,7 +136,7 @@ class PanelBatch(Struct, dict=True):
             parts.append(self.measure(p.places(slice(start, start + rows)), order))
         return all_of(parts)
 
-    def estimate(self, p: Pieces, seg: Segments, h: Array, rule: Rule, shake: Array) -> None:
+    def estimate(self, p: Pieces, seg: Segments, h: Array, rule: GaussRule, shake: Array) -> None:
         """Integrals of pieces from the values of their channels (C, P, n), their errors and rounding floors."""
         coefficients = h @ rule.transform
         size, height = np.abs(coefficients), np.abs(h)

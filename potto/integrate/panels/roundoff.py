@@ -10,7 +10,7 @@ import numpy as np
 
 from potto.integrate.pieces import Ends, Pieces
 from potto.integrate.rules import substitution
-from potto.integrate.rules.gauss import EPS, Rule
+from potto.integrate.rules.gauss import EPS, GaussRule
 from potto.integrate.rules.substitution import Segments
 from potto.kernels.cells import Array, Ints
 
@@ -83,7 +83,7 @@ def misplaced(p: Pieces, seg: Segments, at_ends: Array) -> tuple[Ints, Array]:
     return index, np.where(np.isfinite(lost), lost, 0.0).sum(axis=-1)
 
 
-def note_ends(at_ends: Array, p: Pieces, seg: Segments, coefficients: Array, rule: Rule) -> None:
+def note_ends(at_ends: Array, p: Pieces, seg: Segments, coefficients: Array, rule: GaussRule) -> None:
     """Put down what the integrand, and how steep it, is at the ends of segments, (2, m, 2, all segments), by the pieces
     there: 0 where a map or a grade makes that unknown.
 

@@ -1,8 +1,9 @@
 """Gauss rules that also say how well they did.
 
-Owns `Rule`. From the values of an integrand at the Gauss nodes of a piece one matrix gives its Legendre coefficients;
-the first is the integral, and how the others decay tells how far the rule is from the truth. No second set of nodes
-is needed. (Decay of coefficients against analyticity: Trefethen, Approximation Theory and Practice, ch. 8 and 19.)
+Owns `GaussRule`. From the values of an integrand at the Gauss nodes of a piece one matrix gives its Legendre
+coefficients; the first is the integral, and how the others decay tells how far the rule is from the truth. No second
+set of nodes is needed. (Decay of coefficients against analyticity: Trefethen, Approximation Theory and Practice, ch. 8
+and 19.)
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ EPS = 2.0**-52
 AHEAD = 0.7
 
 
-class Rule(Struct, frozen=True):
+class GaussRule(Struct, frozen=True):
     """The Gauss rule with n nodes on [0, 1].
 
     nodes: (n,), weights: (n,). transform: (n, n), values at the nodes times it are the coefficients of the shifted
@@ -36,14 +37,14 @@ class Rule(Struct, frozen=True):
 
 
 @lru_cache(maxsize=64)
-def gauss(n: int) -> Rule:
+def gauss(n: int) -> GaussRule:
     x, w = np.polynomial.legendre.leggauss(n)
     k = np.arange(n)
     vander = np.polynomial.legendre.legvander(x, n - 1)
     transform = (w / 2)[:, None] * vander * (2 * k + 1)
     ends = np.stack([(-1.0) ** k, np.ones(n)], axis=1)
     derivative = transform @ (2 * np.polynomial.legendre.legval(x, np.polynomial.legendre.legder(np.eye(n))))
-    return Rule((x + 1) / 2, w / 2, transform, ends, k * (k + 1.0), derivative)
+    return GaussRule((x + 1) / 2, w / 2, transform, ends, k * (k + 1.0), derivative)
 
 
 def truncation(size: Array, singular: Bools | bool = False) -> Array:

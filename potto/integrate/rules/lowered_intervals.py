@@ -15,7 +15,7 @@ from msgspec import Struct, field
 
 from potto.core.terms import Term, postorder
 from potto.integrate.rules.intervals import Interval, enclosure
-from potto.integrate.rules.written_intervals import Names, Written
+from potto.integrate.rules.written_intervals import Names, WrittenInterval
 from potto.kernels.cells import Array, Ints
 from potto.kernels.making import counts
 from potto.kernels.native.elementary import module
@@ -58,7 +58,7 @@ class _Enclosing(Struct, frozen=True):
                     ends.append(at.constant("%constants", constants))
                     constants += 1
             box[name] = Names(ends[0], ends[-1])
-        domain = Written(at)
+        domain = WrittenInterval(at)
         results = [name for own in domain.walk(self.terms, box, {}) for name in (*own[:2], _told(domain, own))]
         for column, name in enumerate(results, columns):
             at.store(name, place(column))
@@ -78,7 +78,7 @@ class _Enclosing(Struct, frozen=True):
         return out[:, :count]
 
 
-def _told(domain: Written, found: Names) -> str:
+def _told(domain: WrittenInterval, found: Names) -> str:
     """What is said of bounds beside them."""
     told = domain.number(WILD if found.wild else TAME)
     return told if found.nowhere is None else domain.op("select", found.nowhere, domain.number(NOWHERE), told)

@@ -1,6 +1,6 @@
 """How many nodes are enough, proved before any is evaluated.
 
-Owns `Cell`, `Region`, `Orders`, `proved` and `proved_of_each`.
+Owns `FrameCell`, `Region`, `Orders`, `proved` and `proved_of_each`.
 
 On a cell between known cuts the integrand is one formula, analytic wherever `discs` can bound it. If |f| <= M on the
 ellipse with foci -1, 1 and half-axes adding up to rho, the Gauss rule with n nodes errs, relative to the length of its
@@ -40,7 +40,7 @@ BOXES = {1: 1, 2: 6, 3: 3}
 SURE = 1.001
 
 
-class Cell(Struct, frozen=True):
+class FrameCell(Struct, frozen=True):
     """A stretch between two rows of the frame for every variable, outermost first, and the integrand on it."""
 
     rows: tuple[tuple[int, int], ...]
@@ -55,7 +55,7 @@ class Region(Struct, frozen=True, eq=False):
     bound holds.
     """
 
-    cells: tuple[Cell, ...]
+    cells: tuple[FrameCell, ...]
     outer: tuple[int, ...]
     inner: tuple[int, ...]
     error: float
@@ -96,7 +96,7 @@ def _probes(count: int) -> tuple[Array, Array, Array]:
 
 
 def proved(
-    variables: Sequence[str], frames: Sequence[Sequence[Term]], cells: Sequence[Cell],
+    variables: Sequence[str], frames: Sequence[Sequence[Term]], cells: Sequence[FrameCell],
     middle: Mapping[str, float], radius: Mapping[str, float], tolerance: float,
 ) -> Region | None:  # fmt: skip
     """Orders of Gauss rules that make the error of the integral a part `tolerance` of it; None if none are found.
@@ -117,7 +117,7 @@ def proved(
 
 
 def proved_of_each(
-    variables: Sequence[str], frames: Sequence[Sequence[Term]], cell: Cell, middle: Mapping[str, Array],
+    variables: Sequence[str], frames: Sequence[Sequence[Term]], cell: FrameCell, middle: Mapping[str, Array],
     radius: Mapping[str, float], exact: Sequence[int | None], tolerance: float,
 ) -> Orders:  # fmt: skip
     """The same of one cell in many regions at once, whose middles are (R,) each.
@@ -135,7 +135,7 @@ def proved_of_each(
 
 
 def _bounds(
-    variables: Sequence[str], frames: Sequence[Sequence[Term]], cell: Cell, middle: Mapping[str, Array],
+    variables: Sequence[str], frames: Sequence[Sequence[Term]], cell: FrameCell, middle: Mapping[str, Array],
     radius: Mapping[str, float],
 ) -> tuple[Array, Array]:  # fmt: skip
     """Of a cell in R regions: bounds of the error of rules along each variable, (D, orders, R), and what the integral
@@ -155,7 +155,7 @@ def _bounds(
 
 
 def _on_cell(
-    variables: Sequence[str], frames: Sequence[Sequence[Term]], cell: Cell, env: dict[str, Form], unit: Array,
+    variables: Sequence[str], frames: Sequence[Sequence[Term]], cell: FrameCell, env: dict[str, Form], unit: Array,
     centres: Array, h: Array,
 ) -> Form:  # fmt: skip
     """The integrand times the lengths of the cell's stretches, over variables that run from -1 to 1 on the cell."""

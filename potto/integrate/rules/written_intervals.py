@@ -1,8 +1,8 @@
 """Interval arithmetic written down: the operations on bounds that enclose a term, for whoever carries them out.
 
-Owns `Written`. The bounds are those of `intervals` but for how they are rounded outwards, which neither promises to the
-bit. No question is asked of a number, so that where something overflows bounds come out that are nan, or infinite: then
-`intervals` knows what follows from that.
+Owns `WrittenInterval`. The bounds are those of `intervals` but for how they are rounded outwards, which neither
+promises to the bit. No question is asked of a number, so that where something overflows bounds come out that are nan,
+or infinite: then `intervals` knows what follows from that.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ class Carrier(Protocol):
     def apply(self, code: str, *args: str) -> str: ...
 
 
-class Written(Domain[Names]):
+class WrittenInterval(Domain[Names]):
     """Intervals whose bounds are names of numbers in a text."""
 
     def __init__(self, at: Carrier) -> None:

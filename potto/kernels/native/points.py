@@ -22,12 +22,12 @@ from potto.kernels.native.objects import Loaded
 from potto.kernels.native.promotion import Promotion
 from potto.kernels.native.straight import (
     SIDE,
+    ArgumentPart,
     NotStraight,
     Operation,
     Packed,
-    Part,
     Result,
-    Straight,
+    StraightKernel,
     needed,
     packed,
     read,
@@ -57,13 +57,13 @@ class Pointwise:
         self.kernel, self.forced = kernel, forced
         every = [part for i, arg in enumerate(args) for part in _parts(i, arg)]
         found = {part for part, varies in zip(every, varying, strict=True) if varies}
-        self.varying = found.union(Part((at,), SIDE) for at, varies in forced if varies)
+        self.varying = found.union(ArgumentPart((at,), SIDE) for at, varies in forced if varies)
         self.promotion = Promotion(NAME, _least_lines(kernel, forced))
         self.layout: Layout | None = None
 
     def text(self) -> str:
         """The function. Raises NotStraight."""
-        straight = Straight.of(self.kernel, (at for at, _ in self.forced))
+        straight = StraightKernel.of(self.kernel, (at for at, _ in self.forced))
         constant = straight.constant(name for name, part in straight.parts.items() if part not in self.varying)
         operations = straight.operations(constant)
         names = tuple(dict.fromkeys(name for cell in packed(straight.result) for name in cell.parts()))
@@ -110,12 +110,12 @@ def _side(side: Any) -> Any:
     return side.astype(float) if isinstance(side, np.ndarray) else bool(side)
 
 
-def _parts(number: int, value: Value) -> list[Part]:
+def _parts(number: int, value: Value) -> list[ArgumentPart]:
     """All parts of an argument that is a number."""
     assert isinstance(value, Cell)
     rows = [("t", value.t), ("et", value.et)]
-    return [Part((number,), "v"), Part((number,), "e")] + [
-        Part((number,), kind, d) for kind, row in rows for d in range(len(row))
+    return [ArgumentPart((number,), "v"), ArgumentPart((number,), "e")] + [
+        ArgumentPart((number,), kind, d) for kind, row in rows for d in range(len(row))
     ]
 
 

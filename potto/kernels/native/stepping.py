@@ -17,7 +17,7 @@ from potto.kernels.native.elementary import module
 from potto.kernels.native.objects import Loaded
 from potto.kernels.native.points import address
 from potto.kernels.native.promotion import Promotion
-from potto.kernels.native.straight import Flat, NotStraight, Packed, Part, Result, needed, packed
+from potto.kernels.native.straight import ArgumentPart, FlatKernel, NotStraight, Packed, Result, needed, packed
 from potto.kernels.native.vectors import LANES, Vectors
 from potto.kernels.written import Kernel
 
@@ -35,7 +35,7 @@ class Stepping:
 
     def text(self) -> str:
         """The function. Raises NotStraight."""
-        flat = Flat.of(self.kernel)
+        flat = FlatKernel.of(self.kernel)
         results = [cell.v for cell in packed(flat.result)]
         if any(operation.is_mask and operation.name in results for operation in flat.operations):
             raise NotStraight("a condition as a result")
@@ -78,7 +78,7 @@ class Stepping:
         at.end()
         return module(at, NAME, "ptr %frame, ptr %numbers")
 
-    def room(self, rooms: dict[tuple[int, ...], str], part: Part) -> str:
+    def room(self, rooms: dict[tuple[int, ...], str], part: ArgumentPart) -> str:
         if part.kind != "v" or part.path not in rooms:
             raise NotStraight("a state that changes its form")
         return rooms[part.path]
@@ -117,7 +117,7 @@ def _columns(number: float | Array, shape: tuple[int, ...], size: int) -> Array:
     return np.ascontiguousarray(rows if rows.shape[1] == size else rows[:, np.arange(size) % rows.shape[1]])
 
 
-def _number(args: Sequence[Value], part: Part) -> float | Array:
+def _number(args: Sequence[Value], part: ArgumentPart) -> float | Array:
     found = args[part.path[0]]
     for number in part.path[1:]:
         assert isinstance(found, tuple)

@@ -1,9 +1,9 @@
 """Kernels' texts as straight lines of operations, and which of these don't depend on the point.
 
-Owns `Flat`, all operations of a kernel, and `Straight`, for which it is told what varies. The text of a plain kernel
-(`writing`) is its intermediate form: arguments are taken apart, numbers are computed one line after the other, cells
-are put together. What depends only on arguments that are the same at every point is computed once, by the lines as they
-are; the rest are operations on numbers and masks.
+Owns `FlatKernel`, all operations of a kernel, and `StraightKernel`, for which it is told what varies. The text of a
+plain kernel (`writing`) is its intermediate form: arguments are taken apart, numbers are computed one line after the
+other, cells are put together. What depends only on arguments that are the same at every point is computed once, by the
+lines as they are; the rest are operations on numbers and masks.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ class NotStraight(Exception):
     """A kernel does something that has no form as operations on numbers."""
 
 
-class Part(Struct, frozen=True):
+class ArgumentPart(Struct, frozen=True):
     """A part of an argument: which one (and which item of it, where it is a tuple), and "v", "e", "t" or "et" of it.
 
     Or, as "side", the mask that a trace has for a site, which is the path.
@@ -90,7 +90,7 @@ class Packed(Struct, frozen=True):
 Result = Packed | tuple[Any, ...]
 
 
-class Line(Struct, frozen=True):
+class KernelLine(Struct, frozen=True):
     """A statement of a kernel: the names it sets, those it reads, and itself."""
 
     sets: tuple[str, ...]
@@ -98,16 +98,16 @@ class Line(Struct, frozen=True):
     node: ast.stmt
 
 
-class Straight(Struct, frozen=True):
+class StraightKernel(Struct, frozen=True):
     """A kernel as lines. parts: of arguments, by the names that the lines have for them."""
 
     kernel: Kernel
-    parts: dict[str, Part]
-    lines: tuple[Line, ...]
+    parts: dict[str, ArgumentPart]
+    lines: tuple[KernelLine, ...]
     result: Result
 
     @classmethod
-    def of(cls, kernel: Kernel, forced: Iterable[int] = ()) -> Straight:
+    def of(cls, kernel: Kernel, forced: Iterable[int] = ()) -> StraightKernel:
         """The lines of a plain kernel, whose trace forces the sides of these sites. Raises NotStraight."""
         statements, parts, result = _read(kernel.text, frozenset(forced))
         calls = _Calls()
@@ -143,15 +143,15 @@ class Straight(Struct, frozen=True):
         return _flattened(line.node for line in self.lines if not set(line.sets) <= constant)
 
 
-class Flat(Struct, frozen=True):
-    """All operations of a kernel that lead to its result, and the parts of arguments as in `Straight`."""
+class FlatKernel(Struct, frozen=True):
+    """All operations of a kernel that lead to its result, and the parts of arguments as in `StraightKernel`."""
 
-    parts: dict[str, Part]
+    parts: dict[str, ArgumentPart]
     operations: list[Operation]
     result: Result
 
     @classmethod
-    def of(cls, kernel: Kernel) -> Flat:
+    def of(cls, kernel: Kernel) -> FlatKernel:
         """The operations of a plain kernel. Raises NotStraight."""
         statements, parts, result = _read(kernel.text)
         wanted = {name for cell in packed(result) for name in cell.parts()}
@@ -189,12 +189,12 @@ def packed(result: Result) -> Iterator[Packed]:
 # Statements
 
 
-def _read(text: str, forced: frozenset[int] = frozenset()) -> tuple[list[ast.stmt], dict[str, Part], Result]:
+def _read(text: str, forced: frozenset[int] = frozenset()) -> tuple[list[ast.stmt], dict[str, ArgumentPart], Result]:
     """The statements of a plain kernel that work something out, the parts of arguments, and what is given back."""
     definition = ast.parse(text).body[0]
     assert isinstance(definition, ast.FunctionDef)
     paths: dict[str, tuple[int, ...]] = {arg.arg: (i,) for i, arg in enumerate(definition.args.args[2:])}
-    parts: dict[str, Part] = {}
+    parts: dict[str, ArgumentPart] = {}
     statements = [node for node in definition.body[:-1]
                   if not (_taken_apart(node, paths, parts) or _forced(node, forced, parts))]  # fmt: skip
     last = definition.body[-1]
@@ -202,7 +202,7 @@ def _read(text: str, forced: frozenset[int] = frozenset()) -> tuple[list[ast.stm
     return statements, parts, _result(last.value)
 
 
-def _taken_apart(node: ast.stmt, paths: dict[str, tuple[int, ...]], parts: dict[str, Part]) -> bool:
+def _taken_apart(node: ast.stmt, paths: dict[str, tuple[int, ...]], parts: dict[str, ArgumentPart]) -> bool:
     """Whether a statement takes an argument apart: items of a tuple become paths, parts of cells are noted."""
     if not isinstance(node, ast.Assign):
         return False
@@ -220,18 +220,18 @@ def _taken_apart(node: ast.stmt, paths: dict[str, tuple[int, ...]], parts: dict[
     if not isinstance(value, ast.Attribute) or not isinstance(value.value, ast.Name) or value.value.id not in paths:
         return False
     assert isinstance(target, ast.Name)
-    parts[target.id] = Part(paths[value.value.id], value.attr, direction)
+    parts[target.id] = ArgumentPart(paths[value.value.id], value.attr, direction)
     return True
 
 
-def _forced(node: ast.stmt, forced: frozenset[int], parts: dict[str, Part]) -> bool:
+def _forced(node: ast.stmt, forced: frozenset[int], parts: dict[str, ArgumentPart]) -> bool:
     """Whether a statement looks for a side that the trace has: that is noted as a part; or works out how it falls."""
     match node:
         case ast.Assign(
             targets=[ast.Name(id=mask)],
             value=ast.IfExp(test=ast.Name(id="trace"), body=ast.Call(args=[ast.Constant(value=int() as at)])),
         ) if at in forced:
-            parts[mask] = Part((at,), SIDE)
+            parts[mask] = ArgumentPart((at,), SIDE)
             return True
         case ast.If(test=ast.Compare(left=ast.Name(id=mask), ops=[ast.Is()])):
             return mask in parts
@@ -265,11 +265,11 @@ class _Calls(ast.NodeTransformer):
         return ast.Name(name, ast.Load())
 
 
-def _line(node: ast.stmt) -> Line:
+def _line(node: ast.stmt) -> KernelLine:
     names = [inner for inner in ast.walk(node) if isinstance(inner, ast.Name)]
     sets = tuple(dict.fromkeys(name.id for name in names if isinstance(name.ctx, ast.Store)))
     skipped = {*sets, "trace", "abs", "float", "None"}
-    return Line(sets, frozenset(n.id for n in names if n.id not in skipped and not n.id.startswith("f_")), node)
+    return KernelLine(sets, frozenset(n.id for n in names if n.id not in skipped and not n.id.startswith("f_")), node)
 
 
 def _result(node: ast.expr) -> Result:

@@ -10,7 +10,7 @@ import numpy as np
 from potto.core.terms import Data
 from potto.data.files import digest, read, values_of
 from potto.data.mistakes import DataMistake
-from potto.data.values import Array, NumberRow, Table
+from potto.data.values import NumberArray, NumberRow, Table
 from potto.diagnostics import PottoError
 from potto.kernels import errors
 from potto.kernels.cells import Cell, Rows, Value
@@ -30,7 +30,7 @@ def loaded(term: Data) -> Value:
         raise _wrong(path, found)
     if isinstance(found, Table) and term.column:
         found = found[term.column]
-    if isinstance(found, Array):
+    if isinstance(found, NumberArray):
         return _rows(found)
     assert isinstance(found, float)
     return Cell(found)
@@ -41,7 +41,7 @@ def _wrong(path: Path, mistake: DataMistake) -> PottoError:
     return PottoError([KINDS[mistake.code](errors.NOWHERE, f"{path.name}: {mistake.message}", help=mistake.hint)])
 
 
-def _rows(array: Array) -> Value:
+def _rows(array: NumberArray) -> Value:
     numbers: Any = np.asarray(array.values)
     item: Value = Cell(np.ascontiguousarray(numbers))
     if isinstance(array.item, NumberRow):

@@ -33,9 +33,9 @@ from potto.core.terms import (
     var,
 )
 from potto.diagnostics import PottoError
-from potto.integrate.fixed.a_priori import Settled, proved_sum, settled
-from potto.integrate.fixed.moving_sums import Totals
-from potto.integrate.fixed.straight import Straight
+from potto.integrate.fixed.a_priori import SettledRegion, proved_sum, settled
+from potto.integrate.fixed.moving_sums import MovingTotals
+from potto.integrate.fixed.straight import StraightIntegral
 from potto.kernels.cells import Cell, Value, map_arrays, pad
 from potto.kernels.making import making
 from potto.runtime.answers.convergence import allowance_of_one, widest
@@ -64,7 +64,7 @@ class Direct(Struct, frozen=True):
     term: Integral
     places: tuple[tuple[str, str | Cell], ...]
     dual: bool
-    rules: dict[tuple[tuple[Lam, ...], bool], Straight | None] = {}
+    rules: dict[tuple[tuple[Lam, ...], bool], StraightIntegral | None] = {}
 
     def value(self, machine: Machine, env: Mapping[str, Value]) -> Value | None:
         """The value of the call; None where only the general way has it."""
@@ -106,7 +106,7 @@ class Direct(Struct, frozen=True):
 
     def _prepared(
         self, machine: Machine, working: Machine, env: Mapping[str, Value]
-    ) -> tuple[dict[str, Value], Straight | None]:
+    ) -> tuple[dict[str, Value], StraightIntegral | None]:
         """The parameters of the integral, and its rule; None where there is no such rule."""
         if machine.settings.method in ("mc", "qmc") or machine.taping or (self.dual and machine.directions):
             return {}, None
@@ -139,7 +139,7 @@ class Direct(Struct, frozen=True):
             here[name] = value
         return here, functions
 
-    def _rule(self, machine: Machine, env: dict[str, Value]) -> Straight | None:
+    def _rule(self, machine: Machine, env: dict[str, Value]) -> StraightIntegral | None:
         """The rule that the general way would come to for all numbers, if it is proved. Raises _Passed where at these
         ones it need not be made."""
         reach = machine.linker.reach
@@ -175,11 +175,11 @@ class SettledCall(Struct, frozen=True):
     """An integral all about which is settled near the arguments of a call. fixed, given: its parameters that are
     numbers, and those that are arguments."""
 
-    integral: Settled
+    integral: SettledRegion
     fixed: Mapping[str, Value]
     given: tuple[tuple[str, str], ...]
 
-    def at(self, env: Mapping[str, Cell]) -> Totals | None:
+    def at(self, env: Mapping[str, Cell]) -> MovingTotals | None:
         """The value and its tangents; None where they take more."""
         here = dict(self.fixed)
         for name, place in self.given:
@@ -212,7 +212,7 @@ class SettledAround(Struct, frozen=True):
     machine: Machine
     integrals: tuple[SettledCall, ...]
 
-    def at(self, env: Mapping[str, Cell]) -> Totals | None:
+    def at(self, env: Mapping[str, Cell]) -> MovingTotals | None:
         """As of `SettledCall`; None also where arithmetic meets something that is to be told."""
         found: list[Value] = []
         nodes = 0
@@ -232,7 +232,7 @@ class SettledAround(Struct, frozen=True):
         error: list[Any] = [cell.e, *cell.et]
         if None in number or None in error:  # what does not move, or has no error
             return None
-        return Totals([float(x) for x in number], [float(e) for e in error], [], nodes)
+        return MovingTotals([float(x) for x in number], [float(e) for e in error], [], nodes)
 
 
 class Around(Struct, frozen=True):

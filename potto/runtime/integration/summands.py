@@ -34,22 +34,22 @@ SUM = 8 * UNIT_ROUNDOFF  # what numpy's pairwise sums round off, as a part of al
 FUNCTION = "function"
 
 
-class Batch(Struct, frozen=True):
+class SummandBatch(Struct, frozen=True):
     """Summands of one shape, as `SameShape` has them, with columns of nothing but numbers as arrays."""
 
     function: Lam
     columns: tuple[Array | tuple[Leaf, ...] | str, ...]
     places: tuple[int, ...]
 
-    def part(self, index: slice) -> Batch:
+    def part(self, index: slice) -> SummandBatch:
         columns = tuple(c if isinstance(c, str) else c[index] for c in self.columns)
-        return Batch(self.function, columns, self.places[index])
+        return SummandBatch(self.function, columns, self.places[index])
 
 
 class Grouped(Struct, frozen=True):
     """Summands that are alike, with the names that each group needs, and the places of those that are not."""
 
-    batches: tuple[tuple[Batch, frozenset[str]], ...]
+    batches: tuple[tuple[SummandBatch, frozenset[str]], ...]
     alone: tuple[int, ...]
 
 
@@ -96,16 +96,18 @@ def _flat(shape: object) -> tuple[object, ...]:
     return tuple(part for item in shape for part in _flat(item)) if isinstance(shape, tuple) else (shape,)
 
 
-def _batch(group: SameShape) -> Batch:
+def _batch(group: SameShape) -> SummandBatch:
     def column(leaves: tuple[Leaf, ...] | str) -> Array | tuple[Leaf, ...] | str:
         if isinstance(leaves, str) or any(isinstance(leaf, Var) for leaf in leaves):
             return leaves
         return np.array([leaf.value for leaf in leaves if isinstance(leaf, Const)])
 
-    return Batch(group.function, tuple(map(column, group.columns)), group.places)
+    return SummandBatch(group.function, tuple(map(column, group.columns)), group.places)
 
 
-def _together(machine: Machine, batch: Batch, env: dict[str, Value], parts: list[Value], left: list[int]) -> None:
+def _together(
+    machine: Machine, batch: SummandBatch, env: dict[str, Value], parts: list[Value], left: list[int]
+) -> None:
     """Put sums over the members, so many at a time, and the places of those that are to be evaluated as written."""
     shape = np.broadcast_shapes(*(a.shape for value in env.values() for a in all_arrays(value)))
     step = max(1, CHUNK // max(1, int(np.prod(shape))))
@@ -118,7 +120,7 @@ def _together(machine: Machine, batch: Batch, env: dict[str, Value], parts: list
 
 
 def _evaluated(
-    machine: Machine, batch: Batch, env: dict[str, Value], shape: tuple[int, ...]
+    machine: Machine, batch: SummandBatch, env: dict[str, Value], shape: tuple[int, ...]
 ) -> tuple[Cell | None, Bools]:
     """The sum over the members that have nothing to say, and which have."""
     size, record = len(batch.places), machine.record
@@ -164,7 +166,7 @@ def _evaluated(
 # Members with directions of their own
 
 
-def _slots(batch: Batch, env: dict[str, Value], directions: int) -> list[Slots]:
+def _slots(batch: SummandBatch, env: dict[str, Value], directions: int) -> list[Slots]:
     """Per member, in which directions it moves."""
     moving = {name: frozenset(_moving(value, directions)) for name, value in env.items()}
     shared = frozenset[int]().union(*(moving[c] for c in batch.columns if isinstance(c, str)))
