@@ -180,6 +180,7 @@ def test_an_element_that_varies() -> None:
     ("call", "code", "says"),
     [
         (lambda: M.guarded([5, 7], 3), "P0511", "the index 2 is out of range: the array has 2 elements"),
+        (lambda: M.guarded([5, 7], 1e300), "P0511", "the index 1e+300 is out of range: the array has 2 elements"),
         (lambda: M.guarded([5, 7], 0.5), "P0512", "the index -0.5 is not a whole number"),
         (lambda: M.highest(0, 1.0), "P0511", "this array or range is empty"),
         (lambda: M.lowest(-2, 1.0), "P0511", "this array or range is empty"),

@@ -68,7 +68,7 @@ def _size(size: Value) -> int:
         message = f"an array cannot have {count!r} elements: that is not a whole number"
         raise PottoError([NO_PLACE(errors.NOWHERE, message, help="use `floor` or `ceil` to make it one")])
     if count > MOST_ELEMENTS:
-        raise PottoError([NO_PLACE(errors.NOWHERE, f"an array of {count:.0f} elements is too large")])
+        raise PottoError([NO_PLACE(errors.NOWHERE, f"an array of {count:.16g} elements is too large")])
     return max(0, int(count))
 
 
@@ -141,7 +141,7 @@ def _places(place: Number, size: int) -> Any:
             raise PottoError([NO_PLACE(errors.NOWHERE, message, help="use `floor` or `ceil` to make it one")])
         out = (at < 0) | (at >= size)
     if np.any(out):
-        first = int(at[out].ravel()[0])
+        first = f"{at[out].ravel()[0]:.16g}"
         last = f"indices go from 0 to {size - 1}"
         message = f"the index {first} is out of range: the array has {size} element{'s' if size > 1 else ''}"
         if not size:

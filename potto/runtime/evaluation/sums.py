@@ -32,7 +32,7 @@ def total(machine: Machine, term: Sum, lo: Value, hi: Value, env: dict[str, Valu
     if last < first:
         return tuple(Cell(0.0) for _ in term.body.items) if isinstance(term.body, Tuple) else Cell(0.0)
     if last - first >= MOST_TERMS:
-        raise PottoError([errors.BAD_SUM(errors.NOWHERE, f"a sum of {last - first + 1:.0f} terms is too long")])
+        raise PottoError([errors.BAD_SUM(errors.NOWHERE, f"a sum of {last - first + 1:.16g} terms is too long")])
     params = tuple(sorted(term.body.free | {term.variable}))
     body = lam(params, term.body)
     if trace:
