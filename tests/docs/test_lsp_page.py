@@ -26,7 +26,7 @@ def test_a_hover(file: str, word: str, shown: str) -> None:
     key = library.files.open(ROOT / file)
     source = library.source(key)
     assert source is not None
-    found = ide.hover(library.db, key, source.text.index(word))
+    found = ide.hover_at(library.db, key, source.text.index(word))
     assert found is not None and found.markdown == shown
 
 

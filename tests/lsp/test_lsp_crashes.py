@@ -180,7 +180,7 @@ def test_a_server_that_cannot_start_its_analysis_ends() -> None:
     code = (
         "import sys, potto_lsp.session as s\n"
         "def load(self): raise ImportError('half of an installation')\n"
-        "s.Session.load = load\n"
+        "s.ClientSession.load = load\n"
         "from potto.__main__ import main\nsys.exit(main(['lsp']))"
     )
     greeting = {"jsonrpc": "2.0", "id": 1, "method": "initialize", "params": {"capabilities": {}}}
