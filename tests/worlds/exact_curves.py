@@ -22,6 +22,7 @@ from exact_probability import (
     knocked_out,
     truncated_moments,
 )
+from exact_worked import above_the_ray, mean_beyond, misfit, quarter_in_the_square
 from level_sets_reference import Given, integral
 
 Pair = tuple[float, float]
@@ -174,4 +175,11 @@ CURVES: dict[tuple[str, str, str], Callable[[float], tuple[Pair, Pair]]] = {
         _site
     ),
     ("fields", "polygon", r"\x . area([(0.1, 0.1), (x, 0.5), (0.2, 0.9), (0.4, 0.45)])"): differences(_tip),
+    ("worked", "contact_time", "before"): differences(lambda t: min(max(t, mp.mpf(0)), mp.mpf(1))),
+    ("worked", "disc", "quarter"): differences(quarter_in_the_square),
+    ("worked", "polar", "above"): differences(above_the_ray),
+    ("worked", "robot_arm", r"\l . reach(l, 0.5)"): differences(lambda length: 2 * mp.acos(1 / (2 * length)) / mp.pi),
+    ("worked", "thermostat", r"\s . on(19, s, 1)"): differences(lambda s: mp.ncdf(s - 19)),
+    ("worked", "shortfall", r"\q . shortfall(q, 0, 1)"): differences(mean_beyond),
+    ("worked", "histogram", r"\m . misfit(m, 1.2)"): differences(misfit),
 }
