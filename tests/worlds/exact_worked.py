@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any
 
 import mpmath as mp
@@ -30,5 +31,5 @@ def mean_beyond(q: Any) -> Any:
 def misfit(m: Any) -> Any:
     """Pearson's sum for a normal density of the width 1.2."""
     ends = [mp.ncdf((edge - m) / mp.mpf(1.2)) for edge in EDGES]
-    expected = [sum(COUNTS) * (b - a) for a, b in zip(ends[:-1], ends[1:], strict=True)]
+    expected = [sum(COUNTS) * (b - a) for a, b in pairwise(ends)]
     return sum((count - e) ** 2 / e for count, e in zip(COUNTS, expected, strict=True))
