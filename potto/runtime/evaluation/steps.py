@@ -3,9 +3,11 @@
 Owns `carried` and `spread`. Matrices are (steps, *batch, d, d). Steps are taken in blocks, all blocks at once, so that
 what is done one by one is a few hundred blocks and not ten thousand steps.
 
-`spread` bounds errors to first order, with regard to sign: an error is bounded along axes that turn with the steps
-(Lohner's method: Q from a QR factorization of what a block makes of the axes before). Bounding each component by
-itself in each step would let an error that only turns grow without end.
+`spread` bounds errors to first order, with regard to sign: what each block adds is a box of errors of its own, and what
+later blocks make of all of these together, a zonotope, is known column by column (Kühn 1998). Within a block they are
+bounded along axes that turn with the steps (Lohner's method: Q from a QR factorization of what a block makes of the
+axes before). Bounding each component by itself in each step would let an error that only turns grow without end, and
+along axes alone it would grow as the square of the steps where what it turns along is no circle.
 """
 
 from __future__ import annotations
@@ -18,6 +20,8 @@ import numpy as np
 from potto.kernels.cells import Array
 
 LONGEST = 64  # steps of a block
+# Columns of errors, or in all columns numbers, from which on the older half of them are made one box.
+MOST, NUMBERS = 512, 4096
 
 
 def _length(count: int) -> int:
@@ -71,30 +75,39 @@ def spread(matrices: Array, local: Array, first: Array) -> Array:
         errors = new if errors is None else np.concatenate([step @ errors, new], axis=-1)
         within.append(np.abs(errors).sum(axis=-1))
     shape = within[0].shape[1:]
-    first = np.broadcast_to(first, shape)
-    axes, sizes = np.broadcast_to(np.eye(d), (*shape, d)), first
-    starts = []
+    axes = np.broadcast_to(np.eye(d), (*shape, d))
+    columns = axes * np.broadcast_to(first, shape)[..., None, :]
+    starts, most = [], max(MOST, NUMBERS // d)
     for block in range(len(blocks)):
-        starts.append((axes, sizes))
-        axes, sizes = _turned(maps[-1][block] @ axes, sizes, within[-1][block])
+        starts.append((axes, sizes := _along(axes, columns)))
+        step = maps[-1][block]
+        if columns.shape[-1] > most:
+            older, columns = columns[..., : most // 2], columns[..., most // 2 :]
+            columns = np.concatenate([axes * _along(axes, older)[..., None, :], columns], axis=-1)
+        columns = np.concatenate([step @ columns, within[-1][block][..., None] * np.eye(d)], axis=-1)
+        axes = _turned(step @ axes, sizes)
     q, r = (np.stack(part) for part in zip(*starts, strict=True))
     found = [(np.abs(maps[place] @ q) @ r[..., None])[..., 0] + within[place] for place in range(blocks.shape[1])]
     whole = np.stack(found, axis=1).reshape(-1, *shape)
-    last = (np.abs(axes) @ sizes[..., None])[..., 0]
+    last = np.abs(columns).sum(axis=-1)
     return np.where(np.isnan(bound := np.concatenate([whole, last[None]])[: count + 1]), np.inf, bound)
 
 
-def _turned(moved: Array, sizes: Array, more: Array) -> tuple[Array, Array]:
-    """Perpendicular axes for what axes have become, the longest error first, and how far off along them."""
+def _along(axes: Array, columns: Array) -> Array:
+    """How far errors that are sums of columns (*batch, d, m), each by at most 1, go along perpendicular axes."""
+    far: Array = np.abs(np.swapaxes(axes, -1, -2) @ columns).sum(axis=-1)
+    return far
+
+
+def _turned(moved: Array, sizes: Array) -> Array:
+    """Perpendicular axes for what axes have become, the longest error first."""
     order = np.argsort(-np.linalg.norm(moved, axis=-2) * sizes, axis=-1)
     if order.ndim == 1:
-        moved, sizes = moved[:, order], sizes[order]
+        moved = moved[:, order]
     else:
         moved = np.take_along_axis(moved, order[..., None, :], axis=-1)
-        sizes = np.take_along_axis(sizes, order, axis=-1)
-    q, r = np.linalg.qr(moved)
-    along = np.abs(np.swapaxes(q, -1, -2)) @ more[..., None]
-    return q, (np.abs(r) @ sizes[..., None] + along)[..., 0]
+    q: Array = np.linalg.qr(moved)[0]
+    return q
 
 
 def _blocks(rows: Array, rest: Array) -> Array:
