@@ -72,9 +72,9 @@ class Call(Struct, frozen=True, eq=False):
     ) -> None:  # fmt: skip
         """Keep what answers such calls at once, if anything does. args: as they were given. machine: for tangents, and
         for a batch that which answered."""
-        term, program = self.elaborated, self.world.program
-        if values and isinstance(term, Lam):
-            if getattr(found.value, "size", 1) > 1:
+        term, program, size = self.elaborated, self.world.program, getattr(found.value, "size", 1)
+        if values and size and isinstance(term, Lam):  # an empty batch has nothing to go by
+            if size > 1:
                 many = None if machine is None else together(program, term, values, machine, found, wrt)
                 if many is not None:
                     self.world.memory[self, wrt, BATCHES] = many

@@ -207,6 +207,17 @@ def test_batches_go_straight_to_the_integral(monkeypatch: pytest.MonkeyPatch) ->
     assert answered == [True] * 4  # of the first call nothing is known
 
 
+@pytest.mark.parametrize("shape", [(0,), (0, 3)])
+def test_empty_batches_teach_nothing(shape: tuple[int, ...]) -> None:
+    """Nothing is kept of them for later calls: empty answers are all the same."""
+    f = potto.grad(potto.compile("def f(t, s) integral [0, 1] exp(x) d(x)").f, ["t", "s"])
+    for _ in range(2):
+        assert np.shape(f(np.zeros(shape), 0.5).value) == shape
+    found = f(np.array([0.1, 0.2]), 0.5)
+    assert np.allclose(found.value, np.expm1(1.0), rtol=1e-14, atol=0)  # closed form, to rounding
+    assert np.array_equal(found.tangent, np.zeros((2, 2)))
+
+
 def test_what_is_known_of_calls_is_left_where_more_is_asked() -> None:
     f = potto.compile(RENDERER).f
     for _ in range(3):
