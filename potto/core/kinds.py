@@ -97,11 +97,12 @@ class Index(Base, frozen=True, eq=False):
 
 class Length(Base, frozen=True, eq=False):
     """How many elements an array has, which are numbers that rise if that is asked. like: an array that must have as
-    many."""
+    many. filled: it must have one."""
 
     array: Term
     rising: bool = False
     like: Term | None = None
+    filled: bool = False
 
 
 class Data(Base, frozen=True, eq=False):
@@ -277,7 +278,9 @@ def index(array: Term, place: Term) -> Term:
     return make(Index, array.free | place.free, array, place)
 
 
-def length(array: Term, rising: bool = False, like: Term | None = None) -> Term:
+def length(array: Term, rising: bool = False, like: Term | None = None, filled: bool = False) -> Term:
+    if filled and not _surely_filled(own := _sized(array)):
+        return make(Length, own.free, own, False, None, True)
     if like is not None and length(array) is length(like):
         like = None
     if like is not None:
@@ -294,6 +297,12 @@ def _sized(whole: Term) -> Term:
     while isinstance(whole, Array) and isinstance(whole.size, Length) and whole.size.like is None:
         whole = whole.size.array
     return array(whole.variable, whole.size, ZERO) if isinstance(whole, Array) else whole
+
+
+def _surely_filled(whole: Term) -> bool:
+    if isinstance(whole, Array):
+        return isinstance(whole.size, Const) and whole.size.value > 0
+    return isinstance(whole, ListOf) and len(whole.items) > 0
 
 
 def _rise(items: tuple[Term, ...]) -> bool:

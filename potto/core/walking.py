@@ -139,7 +139,7 @@ def rebuild(term: Term, parts: tuple[Term, ...]) -> Term:
         case Index():
             return index(*parts)
         case Length():
-            return length(parts[0], term.rising, *parts[1:])
+            return length(parts[0], term.rising, parts[1] if len(parts) > 1 else None, term.filled)
         case Deriv():
             return deriv(parts[0])
 

@@ -52,7 +52,7 @@ def interp(elaboration: Elaboration, xs: Term, ys: Term, x: Term) -> Term:
 def image(elaboration: Elaboration, photo: Term, u: Term, v: Term) -> Term:
     """Bilinear between the centres of pixels: `u` along the rows, `v` down the columns, from 0 to 1."""
     row, column = _number(elaboration), _number(elaboration)
-    rows, columns = length(photo), length(index(photo, ZERO))
+    rows, columns = length(photo, filled=True), length(index(photo, ZERO), filled=True)
     across, down = _near(u, columns, column), _near(v, rows, row)
 
     def at(read: Read) -> Term:

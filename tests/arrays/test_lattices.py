@@ -20,6 +20,7 @@ def table(xs: [n] Real, ys: [n] Real, a, b) integral [a, b] interp(xs, ys, x)^2 
 def higher(xs: [n] Real, ys: [n] Real, a, b, t) integral [a, b] [interp(xs, ys, x) > t]*x d(x)
 def beyond(photo: [h, w] Real, a, b, c) integral ([0, 1], [0, 1]) image(photo, u, v)*[a*u + b*v > c] d(u, v)
 def across(photo: [h, w] Real, c, t) integral [0, 1] [image(photo, c*x, x) > t] d(x)
+def made(h, w, u) image([[i + j for j in 0..w-1] for i in 0..h-1], u, 1/2)
 """
 
 
@@ -302,3 +303,21 @@ def pixel(ss: [n] Sprite, photo: [h, w] Real, a, b, d)
     for i, j in ((0, 0), (2, 3), (4, 4), (5, 4), (7, 7)):
         value = mp.fsum(covered(sprite, places[i], places[j]) for sprite in sprites)
         assert abs(found.value[i, j] - value) < 1e-14
+
+
+@pytest.mark.parametrize("shape", [(0, 0), (0, 3), (3, 0)])
+def test_an_image_without_pixels_has_no_value(programs: potto.Module, shape: tuple[int, int]) -> None:
+    photo = np.zeros(shape)
+    asked: list[Callable[[], object]] = [
+        lambda: programs.picked(photo, 0.5, 0.5),
+        lambda: programs.picked(photo.tolist(), np.linspace(0, 1, 5), 0.5),
+        lambda: potto.grad(programs.picked, ["u", "v"])(photo, 0.5, 0.5),
+        lambda: programs.lit(photo, 0, 0, 1),
+        lambda: programs.made(*shape, 0.5),
+    ]
+    for ask in asked:
+        with pytest.raises(potto.PottoError, match="this array or range is empty") as raised:
+            ask()
+        assert raised.value.diagnostics[0].code == "P0511"
+    assert programs.made(1, 1, 0.5).value == 0
+    assert programs.made(2, 2, 0.5).value == 1

@@ -158,7 +158,7 @@ class Oracle:
             case Length():
                 if term.like is not None and len(self.run(term.like, env)) != len(self.run(term.array, env)):
                     raise ValueError("sizes that do not agree")
-                return self.length(self.run(term.array, env), term.rising)
+                return self.length(self.run(term.array, env), term)
             case Data(path=path, column=column):
                 return self.data[path, column]
             case Deriv(function=inner):
@@ -209,8 +209,10 @@ class Oracle:
             state = self.run(term.body, {**env, term.variable: mp.mpf(place), term.state: state})
         return state
 
-    def length(self, whole: Value, rising: bool) -> Value:
-        if rising and not all(a < b for a, b in pairwise(whole)):
+    def length(self, whole: Value, term: Length) -> Value:
+        if term.filled:
+            self.element(whole, 0)
+        if term.rising and not all(a < b for a, b in pairwise(whole)):
             raise ValueError("places that do not rise")
         return mp.mpf(len(whole))
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from potto.core.terms import Array as ArrayTerm
-from potto.core.terms import lam
+from potto.core.terms import Length, lam
 from potto.diagnostics import PottoError, declare
 from potto.kernels import errors
 from potto.kernels.cells import Cell, Env, Number, Rows, Value, all_arrays, listed
@@ -151,14 +151,16 @@ def _places(place: Number, size: int) -> Any:
     return at.astype(np.int64)
 
 
-def length(machine: Machine, whole: Value, rising: bool, like: Value | None) -> Value:
-    """How many elements an array has, which are numbers that rise if that is asked, and as many as `like` has."""
+def length(machine: Machine, term: Length, whole: Value, like: Value | None) -> Value:
+    """How many elements an array has, of which all holds that the term asks."""
     count = _count(whole)
     if like is not None and _count(like) != count:
         message = f"two arrays that go together have {count} and {_count(like)} elements"
         help = "take as many of both: `+`, `-`, `*`, `/`, `dot` and `interp` go element by element"
         raise PottoError([RAGGED(errors.NOWHERE, message, help=help)])
-    if rising:
+    if term.filled and not count:
+        _places(0.0, count)
+    if term.rising:
         _see_that_it_rises(whole)
     return Cell(float(count), None, (None,) * machine.directions)
 

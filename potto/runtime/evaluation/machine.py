@@ -78,7 +78,7 @@ class Semantics:
     culled: Callable[[Machine, Sum, int, int, dict[str, Value]], Value | None]
     array: Callable[[Machine, Array, Value, dict[str, Value]], Value]
     element: Callable[[Value, Value], Value]
-    length: Callable[[Machine, Value, bool, Value | None], Value]
+    length: Callable[[Machine, Length, Value, Value | None], Value]
     data: Callable[[Data], Value]
     fold: Callable[[Machine, Fold, Value, Value, Value, dict[str, Value]], Value]
     integral: Callable[[Machine, Integral, dict[str, Value]], Value]
@@ -375,7 +375,7 @@ class Machine:
 
     def length(self, term: Length, whole: Value, like: Value | None) -> Value:
         try:
-            return self.semantics.length(self, whole, term.rising, like)
+            return self.semantics.length(self, term, whole, like)
         except PottoError as error:
             raise error.of(term) from None
 
