@@ -8,6 +8,7 @@ it would tell again. A batch of numbers goes from its arrays to the integral.
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Literal
@@ -115,7 +116,7 @@ class AtOnce(Kept, frozen=True, eq=False):
         error: Sequence[Any] = found.error
         rtol = settings.rtol
         for x, e in zip(number, error, strict=True):
-            if not e <= rtol * abs(x):
+            if not e <= rtol * abs(x) < math.inf:
                 return None
         every: Any = None
         if axes:

@@ -232,6 +232,18 @@ def test_what_is_known_of_calls_is_left_where_more_is_asked() -> None:
         f(True)
 
 
+def test_infinite_answers_near_those_of_before_have_not_converged() -> None:
+    """What stands beside an integral may be infinite where all about the integral is settled."""
+    text = "def f(a, b) 1/a + integral [0, 1] exp(b*x) d(x)\ndef g(a, b) sqrt(a) + integral [0, 1] exp(b*x) d(x)\n"
+    known, new = potto.compile(text), potto.compile(f"{text}\n")
+    for _ in range(3):
+        assert known.f(4.0, 1.0).converged and potto.grad(known.g)(4.0, 1.0).converged
+    for module in (known, new):
+        value, slope = module.f(0.0, 1.0), potto.grad(module.g)(0.0, 1.0)
+        assert value.value == slope.tangent == math.inf
+        assert not value.converged and not slope.converged
+
+
 def test_where_the_edge_lies_on_a_corner_the_general_way_says_so() -> None:
     f = potto.compile("def f(t) integral [0, 1] [x < t] d(x)").f
     assert not potto.deriv(f)((0.3, 1.0)).notes
