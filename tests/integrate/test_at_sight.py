@@ -94,6 +94,19 @@ def test_pixels_of_a_scene_as_by_a_plan(fresh, monkeypatch):
     assert looked(first[0])
 
 
+def test_ten_digits_where_the_edge_enters_at_a_side(fresh, monkeypatch):
+    """Where that is counts 4000 times in the derivative; what is seen is what a plan finds."""
+    by_law = potto.deriv(potto.load(SCENE).by_law)
+    more = {"dq": (-0.2, 1.0), "dex": (0.0, 0.0), "dfocal": (1.0, 0.0), "dlx": (0.2, 0.0), "dthreshold": (0.3, 0.0)}
+    with potto.settings(backend="numpy", rtol=1e-10):
+        seen = by_law(-0.0375, -0.0515625, **more)
+        monkeypatch.setattr(choices, "MOST_LOOKS", 0)
+        planned = by_law(-0.0375, -0.0515625, **more)
+    assert looked(seen) and not looked(planned)
+    assert abs(seen.value - planned.value) <= seen.error + planned.error
+    assert abs(seen.tangent - planned.tangent) <= seen.tangent_error + planned.tangent_error
+
+
 def test_components(disc):
     place = CORNERED
     both = disc.tinted(*place)

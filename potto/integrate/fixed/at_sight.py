@@ -25,7 +25,7 @@ from potto.integrate.decomposition.root_isolation import flat
 from potto.integrate.fixed.straight import on_sides
 from potto.integrate.pieces import Evaluator, Sums
 from potto.integrate.rules.gauss import EPS, gauss, truncation
-from potto.integrate.rules.intervals import INTERVALS, Interval, marked
+from potto.integrate.rules.intervals import CLOSE_INTERVALS, Interval, marked
 from potto.integrate.rules.jets import Jet, Jets, NotAnalytic
 from potto.kernels.cells import Array, Cell, Value
 from potto.kernels.support import ARRAYS
@@ -38,7 +38,7 @@ STEPS, CLOSE = 12, 1e-8  # of Newton's, at the most; a part of the range, whose 
 CALM, STEADY = 4.0, 4.0
 APART = 1e-6  # of a range: places that are closer are for those who tell what meets there
 
-_INTERVALS, _FLOATS = Jets(INTERVALS), Jets(ARRAYS)
+_INTERVALS, _FLOATS = Jets(CLOSE_INTERVALS), Jets(ARRAYS)
 Env = dict[str, Jet[Interval]]
 
 

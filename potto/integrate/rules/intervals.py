@@ -1,9 +1,10 @@
 """Interval arithmetic over batches: which values a term can take on boxes.
 
-Owns `enclosure`. Bounds are wide enough to hold every value that the term takes, rounding included, and get closer as
-the boxes get smaller; where nothing is known they are infinite, and where the term has no value anywhere on a box
-(the root of what is negative all over) they are nan. (Moore, Kearfott and Cloud, Introduction to Interval Analysis,
-2009.)
+Owns `enclosure`, `INTERVALS` and `CLOSE_INTERVALS`. Bounds are wide enough to hold every value that the term takes,
+rounding included, and get closer as the boxes get smaller; where nothing is known they are infinite, and where the term
+has no value anywhere on a box (the root of what is negative all over) they are nan. Close ones hold what the term is
+worth in exact arithmetic, which is all that a proof asks. (Moore, Kearfott and Cloud, Introduction to Interval
+Analysis, 2009.)
 """
 
 from __future__ import annotations
@@ -107,7 +108,21 @@ class _Intervals(Domain[Interval]):
         return least, most
 
 
-INTERVALS = _Intervals()
+class _CloseIntervals(_Intervals):
+    """Bounds of what a term is worth in exact arithmetic. What computed values are off by is not within: only the
+    operations that find the bounds are rounded, correctly, so that an EPS of its result is enough for each."""
+
+    def builtin(self, node: Prim, known: Mapping[Term, Interval]) -> Interval:
+        args = [known[arg] for arg in node.args]
+        roundings = _roundings(node)
+        if roundings is None or not _all_finite(args):
+            return super().builtin(node, known)
+        if node.op == "add":
+            return marked(*_sum(args))
+        return _defined(args, _ARITHMETIC[node.op](node, args), roundings * EPS)
+
+
+INTERVALS, CLOSE_INTERVALS = _Intervals(), _CloseIntervals()
 
 
 @lru_cache(maxsize=256)
@@ -170,6 +185,32 @@ def _add(node: Prim, args: list[Interval]) -> Interval:
             slack = np.where(np.isfinite(slack), slack, 0.0)
         lo, hi = lo - slack, hi + slack
     return lo, hi
+
+
+def _sum(args: list[Interval]) -> Interval:
+    """Rounded outwards at each addend."""
+    lo, hi = args[0]
+    for low, high in args[1:]:
+        lo, hi = lo + low, hi + high
+        lo, hi = lo - EPS * abs(lo), hi + EPS * abs(hi)
+    return lo, hi
+
+
+def _roundings(node: Prim) -> int | None:
+    """How many correctly rounded operations an arithmetic one is here, one after the other; None if it is others."""
+    match node.op, node.args:
+        case "neg", _:
+            return 0
+        case "add", _:
+            return 1
+        case "mul", args if max(map(args.count, args)) <= 2:
+            return len(args) - 1
+        case "div", _:
+            return 2  # by the reciprocal
+        case "pow", (_, Const(value=2.0)):
+            return 1
+        case _:
+            return None
 
 
 def _largest(a: Interval) -> Any:
