@@ -36,6 +36,7 @@ class Collected(Struct, frozen=True):
         return {dict(monomial).get(atom, Fraction(0)): part for monomial, part in self.parts.items()}
 
 
+@lru_cache(maxsize=256)  # who has failed to solve a term asks again, to say why
 def collect(term: Term, name: str) -> Collected | None:
     """The polynomial that a term is in what contains `name`; None if it grows too large."""
     memo: dict[Term, Parts] = {}
