@@ -144,10 +144,10 @@ class _Pass:
         self.headed = self.blocks.state == "body"
         return self.headed
 
-    def _is_prefix(self, index: int = -1) -> bool:
-        """Whether the sign that was written last (or would be next, at 0) has no operand before it."""
-        at = len(self.out) + index
-        return at < 1 or self.out[at].starts or self.out[at - 1].token.kind not in _ENDS_OPERAND
+    def _is_prefix(self) -> bool:
+        """Whether the sign that was written last has no operand before it."""
+        sign = self.out[-1]
+        return len(self.out) == 1 or sign.starts or sign.opens or self.out[-2].token.kind not in _ENDS_OPERAND
 
     def _is_star_of_type(self, before: Token) -> bool:
         return before.kind == "NAME" and before.text in _TYPES

@@ -45,6 +45,7 @@ def check(written: str, expected: str) -> None:
         ("x = exp(y)[y<t]", "x = exp(y) [y < t]"),
         ("x = diffeo (u,v) ?1 :0", "x = diffeo(u, v) ? 1 : 0"),
         ("def f (x,y)( z ):x", "def f(x, y)(z): x"),
+        ("def f(x) - x", "def f(x) -x"),
         (
             "def f(x:Real*,g:(Real,Real*)->Real)->Real [x]\n x",
             "def f(x: Real*, g: (Real, Real*) -> Real) -> Real[x]\n    x",
@@ -195,6 +196,8 @@ def test_bodies_come_to_a_line_of_their_own_before_bounds_ranges_and_variables_a
     first, second = "weights[i] * (observations[i + 1] - observations[i])^2", "integral [0, c] x * [x < t] d(x)"
     loop = f"sum i in 0..number_of_them - 2 ({first}\n        * {second})"
     assert formatted(f"def loss(c, t): {loop}") == f"def loss(c, t):\n    {loop}\n"
+    negative = f"def loss(c, t)\n    -{loop}\n"
+    assert formatted(f"def loss(c, t) -{loop}") == negative == formatted(negative)
 
 
 def test_broken_chunks_are_kept_as_they_are() -> None:
