@@ -19,8 +19,6 @@ class Counts(Struct):
     reused: int = 0
     seconds: float = 0.0
     kernel_seconds: float = 0.0  # of these
-    worked: float = 0.0  # seconds of the processor
-    kernels_worked: float = 0.0
     native: int = 0
     kept: int = 0
     native_seconds: float = 0.0
@@ -36,26 +34,25 @@ counts = Counts()
 
 
 class _Making(threading.local):
-    """`with making:` adds the time of the block, in this thread, to those seconds of `counts`: by the clock, and of the
-    processor, which others may be using as well."""
+    """`with making:` adds the time of the block by the clock to those seconds of `counts`. `worked`: the seconds of the
+    processor, which others may be using as well, that such blocks of this thread have taken."""
 
     depth = 0
-    start = worked = 0.0
+    start = since = worked = 0.0
 
-    def __init__(self, by_the_clock: str, by_the_processor: str) -> None:
-        self.names = by_the_clock, by_the_processor
+    def __init__(self, seconds: str) -> None:
+        self.seconds = seconds
 
     def __enter__(self) -> None:
         if not self.depth:
-            self.start, self.worked = time.perf_counter(), time.thread_time()
+            self.start, self.since = time.perf_counter(), time.thread_time()
         self.depth += 1
 
     def __exit__(self, *exc: object) -> None:
         self.depth -= 1
         if not self.depth:
-            spent = time.perf_counter() - self.start, time.thread_time() - self.worked
-            for name, seconds in zip(self.names, spent, strict=True):
-                setattr(counts, name, getattr(counts, name) + seconds)
+            setattr(counts, self.seconds, getattr(counts, self.seconds) + time.perf_counter() - self.start)
+            self.worked += time.thread_time() - self.since
 
 
-making, compiling = _Making("seconds", "worked"), _Making("kernel_seconds", "kernels_worked")
+making, compiling = _Making("seconds"), _Making("kernel_seconds")

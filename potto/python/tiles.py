@@ -26,7 +26,7 @@ from msgspec.structs import asdict, replace
 from potto.diagnostics import PottoError
 from potto.integrate.costs import counting, wanted
 from potto.kernels.cells import Value, all_arrays, map_arrays
-from potto.kernels.making import counts
+from potto.kernels.making import making
 from potto.projects.settings import Settings, current, executor, settings
 from potto.python.arguments import Batch, cut, flattened
 from potto.runtime.answers.batches import joined, unfinished, with_what_was_made
@@ -233,9 +233,9 @@ class _Tiles(Struct):
 
     def _alone(self, block: Part) -> Estimate:
         # By the clock, a processor that others use as well would be a slow function.
-        start, making = time.thread_time(), counts.worked
+        start, made = time.thread_time(), making.worked
         found = self.done[block[0]] = self.here(block)
-        self.spent = time.thread_time() - start - (counts.worked - making)
+        self.spent = time.thread_time() - start - (making.worked - made)
         return found
 
     def _shared(self, pool: Executor, rest: list[Part], told: Callable[[float, int], None]) -> None:

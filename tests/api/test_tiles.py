@@ -244,12 +244,18 @@ def test_the_first_block_is_asked_again_however_long_it_takes(monkeypatch: pytes
     assert size_by(monkeypatch, 25600, lambda members: 0.13 + 0.00025 * members + next(first, 0.0)) == 4096
 
 
-def test_blocks_are_timed_without_what_is_made_for_them(monkeypatch: pytest.MonkeyPatch) -> None:
-    """By the processor: one that others use as well is no slow function, and what is made is made once."""
+def test_blocks_are_timed_without_what_is_made_for_them() -> None:
+    """By the processor: one that others use as well is no slow function, and what is made is made once. What another
+    thread makes meanwhile takes nothing from it."""
 
-    def here(part: tuple[int, int]) -> None:
+    def made() -> None:
         with making:
             work(0.2)
+
+    def here(part: tuple[int, int]) -> None:
+        made()
+        with ThreadPoolExecutor(1) as pool:
+            pool.submit(made).result()
         work(0.05)
         time.sleep(0.1)
 

@@ -67,9 +67,9 @@ class Promotion:
     def by_numpy(self) -> Iterator[None]:
         """Count the time of the block as that of numpy: the processor's, whoever else is using it. Kernels that are
         made in it are made once."""
-        start, making = time.thread_time(), counts.kernels_worked
+        start, made = time.thread_time(), compiling.worked
         yield
-        self.spent += time.thread_time() - start - (counts.kernels_worked - making)
+        self.spent += time.thread_time() - start - (compiling.worked - made)
 
     def _pays(self) -> bool:
         """Whether numpy has taken as long as machine code would; until its text is written, as the least would."""
