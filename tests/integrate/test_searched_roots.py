@@ -246,3 +246,20 @@ def test_stretches_that_touch_others_are_known(seed: int) -> None:
     some, others = stretches(12), stretches(seed)
     one_by_one = [((others[0] == o) & (others[2] >= a) & (others[1] <= b)).any() for o, a, b in zip(*some)]
     assert list(touched(some, others)) == one_by_one
+
+
+@pytest.mark.parametrize("at", [0.5, 0.25, 0.75, 0.3])
+def test_a_pole_where_cells_are_halved_hides_no_root(at: float) -> None:
+    """On it no enclosure says anything. On each side of it the condition holds from one root on (mpmath)."""
+
+    def beyond(x: Any) -> Any:
+        return mp.mpf(1) / 10 / abs(x - at) + mp.sin(3 * x)
+
+    s = mp.mpf("1.25")
+    ends = [mp.findroot(lambda x: beyond(x) - s, e, solver="anderson") for e in ((0, at - 1e-3), (at + 1e-3, 1))]
+    rate = sum(1 / abs(mp.diff(beyond, x)) for x in ends)
+    f = potto.compile(f"def f(s) integral [0, 1] [0.1/abs(x - {at}) + sin(3*x) > s] d(x)").f
+    answer = potto.deriv(f)((1.25, 1.0))
+    assert answer.converged
+    assert abs(answer.value - (ends[1] - ends[0])) <= answer.error <= 1e-13
+    assert abs(answer.tangent + rate) <= answer.tangent_error + 1e-15 <= 1e-13  # the rate is of some roundings

@@ -236,7 +236,8 @@ class _Cells(Struct, dict=True):
             far = np.maximum(np.abs(least), np.abs(most)) * reach
             apart = (here[0] - far > 0) | (here[1] + far < 0)
             steady = (least >= 0) | (most <= 0)
-            shallow = ~steady & (here[0] <= 0) & (here[1] >= 0) & (far <= SHALLOW * (here[1] - here[0]))
+            width = here[1] - here[0]  # infinite where nothing is known, as on a pole
+            shallow = ~steady & (here[0] <= 0) & (here[1] >= 0) & (far <= SHALLOW * width) & (width < np.inf)
         for end in ends:
             known = ~np.isnan(end[0])
             apart, steady = apart & known, steady & known
