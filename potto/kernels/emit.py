@@ -16,7 +16,7 @@ from itertools import chain
 from msgspec import Struct
 
 from potto.calculus.differentiation.derivative import partial
-from potto.core.terms import Branch, Const, If, Prim, Term, Var, postorder, var
+from potto.core.terms import Branch, Const, If, Prim, Term, Var, const, postorder, var
 from potto.kernels.slopes import EXACT, Loss, losses
 from potto.kernels.whole import ROUNDING, UNIT_ROUNDOFF
 from potto.primitives import EXPONENT, PRIMITIVES
@@ -26,10 +26,6 @@ ZERO = "0.0"
 ONE = "1.0"
 LONG = 24  # summands or factors on a line
 COMPARISONS = {"lt": "<", "le": "<=", "gt": ">", "ge": ">=", "eq": "==", "ne": "!="}
-
-
-_HOLDS = {"lt": operator.lt, "le": operator.le, "gt": operator.gt, "ge": operator.ge, "eq": operator.eq,
-          "ne": operator.ne}  # fmt: skip
 
 
 class Scalar(Struct, frozen=True):
@@ -168,7 +164,7 @@ class Lines:
         if not self.rounding and (op == "add" or op in COMPARISONS):
             numbers = [number for a in args if (number := _number(a)) is not None]
             if len(numbers) == len(args):  # in a partial derivative: the exponent of a power, and whether it is 0
-                folded = sum(numbers) if op == "add" else _HOLDS[op](*numbers)
+                folded = sum(numbers) if op == "add" else getattr(operator, op)(*numbers)
                 return self.constant(folded) if op == "add" else self.plain(repr(folded))
         if op in COMPARISONS:
             a, b = args
@@ -250,7 +246,7 @@ class Lines:
             curve = self.smooth(second_partial(op, len(args), i, j), local, memo).v
             return None if curve == ZERO else curve
 
-        e = self.total([self.off(op, args, i, slope[i], x) for i in moving if (x := args[i].e)])
+        e = self.total([self.moved(op, args, i, slope[i], x) for i in moving if (x := args[i].e)])
         if self.side and self.directions and PRIMITIVES[op].kinks(*map(var, names)):
             return self.rounded(Scalar(v, e, *self.on_one_side(op, args, bend, lost)), op, args)
         return self.rounded(Scalar(v, e, *self.tangents(op, args, slope, bend, lost)), op, args)
@@ -309,6 +305,14 @@ class Lines:
                 ]
             et.append(self.total(bounds))
         return tuple(t), tuple(et)
+
+    def moved(self, op: str, args: Sequence[Scalar], i: int, slope: str, e: str) -> str:
+        """What a builtin is off as its i-th argument is off by e: where that is exact nothing, however steep it is."""
+        size = self.off(op, args, i, slope, e)
+        numbers = [var(a.v) if (number := _number(a)) is None else const(number) for a in args]
+        if not PRIMITIVES[op].steep(*numbers):
+            return size
+        return f"{self.ufunc('support.by_error')}({size}, {e})"
 
     def off(self, op: str, args: Sequence[Scalar], i: int, *factors: str) -> str:
         """What a builtin is off as its i-th argument is."""

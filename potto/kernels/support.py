@@ -120,6 +120,13 @@ def beside(surface: Number, tangent: Number, side: float) -> Mask:
     return (surface > 0) | ((surface == 0) & (side * tangent > 0))
 
 
+def by_error(off: Number, error: Number) -> Number:
+    """What a builtin is off by what an argument is: nothing where that is exact, also if infinity times 0 is nan."""
+    if not isinstance(off, np.ndarray):
+        return 0.0 if off != off and error == 0 else off
+    return np.where(np.equal(error, 0), 0.0, off) if np.isnan(off.sum()) else off
+
+
 def by_exponent(base: Number, off: Number) -> Number:
     """What a power, or its slope, is off by what its exponent is, worked out for a positive base: at one that is not
     positive exponents are whole, and so exact."""

@@ -110,6 +110,7 @@ pow_entry = register(
         partials=_power_partials,
         domain=((1e-3, 1e3), (-20.0, 20.0)),
         edges=_power_edges,
+        steep=lambda base, exponent: not isinstance(exponent, Const) or 0 < exponent.value < 1,
         example="pow(2, 10)",
     )
 )

@@ -7,7 +7,7 @@ from typing import Any
 
 from potto.core.terms import ONE, Term, add, branch, const, div, mul, prim, sub
 from potto.primitives.bounds import exponential, share, slack
-from potto.primitives.registry import Elementwise, Primitive, Terms, register
+from potto.primitives.registry import Elementwise, Primitive, Terms, always, register
 
 NAN = const(math.nan)
 HALF = const(0.5)
@@ -46,6 +46,7 @@ sqrt = register(
         partials=lambda x: (div(HALF, prim("sqrt", x)),),
         domain=((0.0, 1e12),),
         edges=lambda x: (x,),
+        steep=always,
         inverse=_square_of_root,
         increasing=1,
         example="sqrt(2)",

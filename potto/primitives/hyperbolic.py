@@ -7,7 +7,7 @@ from typing import Any
 
 from potto.core.terms import ONE, Term, add, branch, const, div, mul, neg, prim, sub
 from potto.primitives.bounds import clear, rising, waves
-from potto.primitives.registry import Elementwise, Primitive, Terms, register
+from potto.primitives.registry import Elementwise, Primitive, Terms, always, register
 
 HALF = const(0.5)
 
@@ -158,6 +158,7 @@ acosh = register(
         partials=lambda x: (div(ONE, mul(prim("sqrt", sub(x, ONE)), prim("sqrt", add(x, ONE)))),),
         domain=((1.0, 1e150),),
         edges=lambda x: (sub(x, ONE),),
+        steep=always,
         inverse=lambda y: (branch((y,), False, prim("cosh", y), const(math.nan)),),
         increasing=1,
         example="cosh(1)",

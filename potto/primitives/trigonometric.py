@@ -7,7 +7,7 @@ from typing import Any
 
 from potto.core.terms import ONE, PI, Term, add, branch, const, div, mul, neg, prim, sub
 from potto.primitives.bounds import angle, clear, length, rising, tangent, wave, waves
-from potto.primitives.registry import Elementwise, Primitive, Terms, register
+from potto.primitives.registry import Elementwise, Primitive, Terms, always, register
 
 NAN = const(math.nan)
 HALF_PI = div(PI, const(2.0))
@@ -126,6 +126,7 @@ asin = register(
         partials=lambda x: (div(ONE, _half_circle(x)),),
         domain=((-1.0, 1.0),),
         edges=lambda x: (sub(ONE, x), add(ONE, x)),
+        steep=always,
         inverse=lambda y: _between(y, neg(HALF_PI), HALF_PI, prim("sin", y)),
         increasing=1,
         example="asin(0.5)",
@@ -149,6 +150,7 @@ acos = register(
         partials=lambda x: (neg(div(ONE, _half_circle(x))),),
         domain=((-1.0, 1.0),),
         edges=lambda x: (sub(ONE, x), add(ONE, x)),
+        steep=always,
         inverse=lambda y: _between(y, const(0.0), PI, prim("cos", y)),
         increasing=-1,
         example="acos(0.5)",
@@ -210,6 +212,7 @@ hypot = register(
         interval=length,
         doc="The length of (x, y), that is sqrt(x^2 + y^2), without overflow.",
         partials=lambda x, y: (_over_length(x, x, y), _over_length(y, x, y)),
+        steep=always,
         domain=((-1e150, 1e150), (-1e150, 1e150)),
         kinks=lambda x, y: (x, y),  # a cone: it has a kink in x where y is 0, and nearly one where y is small
         example="hypot(3, 4)",

@@ -5,6 +5,7 @@ The answers are derivatives that the books have in closed form, at 60 digits; wh
 
 from __future__ import annotations
 
+import importlib.util
 import math
 from collections.abc import Callable
 from fractions import Fraction
@@ -18,6 +19,7 @@ from potto.python import gradients
 Slopes = Callable[[mp.mpf], tuple[mp.mpf, mp.mpf]]
 SMALL = (1e-8, 1e-4, 0.1, 0.7)
 WIDE = (*SMALL, 2.0, 3.8317, 24.0, 26.0, 1e4, 445096.69645057945, 1e8)
+needs_llvm = pytest.mark.skipif(importlib.util.find_spec("llvmlite") is None, reason="llvmlite is not installed")
 BELOW_ONE = (*SMALL, 0.9999, 1 - 1e-8, 1 - 1e-12, 1 - 1e-15)
 
 
@@ -124,3 +126,34 @@ def test_bars_of_slopes_are_no_larger_than_conditions_ask_for() -> None:
     found = potto.deriv(program.e)((1 - 1e-12, 1.0))
     assert found.tangent_error < 400 * 2**-53 * found.tangent
     assert potto.deriv(program.s)((1.0, 1.0)).tangent_error <= 2**-52
+
+
+@pytest.mark.parametrize("backend", ["numpy", pytest.param("native", marks=needs_llvm)])
+@pytest.mark.parametrize(
+    "text",
+    ["sqrt(1 - x)", "(1 - x)^(1/3)", "(1 - x)^(x/2)", "norm([x - 1, 2 - 2*x])", "hypot(x - 1, 1 - x)"],
+)
+def test_an_exact_argument_spoils_nothing_where_a_slope_is_infinite(text: str, backend: str) -> None:
+    """Alone, and in a batch with others."""
+    function = potto.compile(f"def f(x) {text}\n").f
+    with potto.settings(backend=backend):
+        alone, among = function(1.0), function([1.0, 0.25, 1.0])
+    assert (alone.value, alone.error) == (0, 0)
+    assert (among.value[::2] == 0).all()
+    assert (among.error[::2] == 0).all()
+    assert alone.converged
+    assert among.converged
+
+
+@pytest.mark.parametrize(("text", "true"), [("asin(2 - x)", mp.pi / 2), ("acos(2 - x)", 0)])
+def test_angles_of_exact_sines_of_1(text: str, true: mp.mpf) -> None:
+    found = potto.compile(f"def f(x) {text}\n").f(1.0)
+    assert abs(found.value - true) <= found.error <= math.ulp(float(true)) * (true > 0)
+    assert found.converged
+
+
+def test_an_argument_that_is_off_is_off_where_a_slope_is_infinite() -> None:
+    """0.1 + 0.2 - 0.3 is 5.6e-17 in double precision, and 0 in truth: the root is 7.5e-9 off."""
+    found = potto.compile("def f(a, b, c) sqrt(a + b - c)\n").f(0.1, 0.2, 0.1 + 0.2)
+    assert found.value == 0
+    assert found.error >= math.sqrt(2.0**-55)

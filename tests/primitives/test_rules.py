@@ -184,3 +184,15 @@ def test_formulas_are_what_they_define(primitive: Primitive, data: st.DataObject
         wanted = function(primitive.name)(*map(mp.mpf, point))
         found = evaluate(formula, dict(zip(names, point)))
         assert abs(found - wanted) <= mp.mpf("1e-20") * (1 + abs(wanted))
+
+
+@pytest.mark.parametrize("primitive", [p for p in OF_ONE if p.partials], ids=by_name)
+def test_builtins_that_are_steep_say_so(primitive: Primitive) -> None:
+    """Where one of one argument has a value its slope is a number, at 0 and at the ends of where it is defined."""
+    x = var("x")
+    (slope,) = primitive.partials(x)  # type: ignore[misc]
+    with np.errstate(all="ignore"):
+        for place in {0.0, 1.0, -1.0, *primitive.within}:
+            value, rise = ARRAYS.walk((prim(primitive.name, x), slope), {"x": np.float64(place)}, {})
+            if np.isfinite(place) and np.isfinite(value) and not np.isfinite(rise):
+                assert primitive.steep(x)

@@ -371,6 +371,8 @@ class _Operations:
             return self.share(A_TANGENT if function == "whole_slopes" else HALF_ULP, args[0], name)
         if function == "potto_clamp":
             return self.new("min", (self.new("max", args[:2]), args[2]), name)
+        if function == "support_by_error":
+            return self.new("select", (self.new("ne", (args[1], ZERO)), args[0], ZERO), name)
         if function == "sign":
             negative = self.new("select", (self.new("lt", (args[0], ZERO)), "-1.0", args[0]))
             return self.new("select", (self.new("gt", (args[0], ZERO)), "1.0", negative), name)
