@@ -20,7 +20,9 @@ max-width:72rem;margin:2rem auto;padding:0 1rem}
 h2{border-top:1px solid var(--line);padding-top:1.5rem;margin-top:2.5rem}p,figcaption,td{color:var(--faint)}
 .row{display:flex;flex-wrap:wrap;gap:1rem}figure{margin:0}figcaption{font-size:.8rem}
 figure img{height:15rem;max-width:100%;border-radius:6px;border:1px solid var(--line)}
-.drawn img{image-rendering:pixelated}
+.row figcaption{width:0;min-width:100%}.drawn img{image-rendering:pixelated}
+.entries{display:grid;grid-template-columns:repeat(auto-fill,minmax(min(22.5rem,100%),1fr));gap:0 1rem}
+.entry{min-width:0}.several{grid-column:1/-1}.number{white-space:nowrap}
 code{font-size:.85em}th,td{text-align:left;vertical-align:top;padding:.1rem .8rem .1rem 0}.measured{font-size:.85rem}
 """
 # Of the sheet: its width, what is between cells, above a chapter and below a picture for how many lines, and how wide a
@@ -73,14 +75,20 @@ def index(chapters: Sequence[Section], folder: Path, seconds: float) -> str:
     ]
     for section in chapters:
         parts.append(f"<h2>{html.escape(section.title)}</h2><p>{html.escape(section.about)}</p>")
-        for entry in section.entries:
-            parts.append(f"<h3>{html.escape(entry.title)}</h3><p>{html.escape(entry.about)}</p>" if entry.about
-                         else f"<h3>{html.escape(entry.title)}</h3>")  # fmt: skip
-            parts.append(f'<div class="row">{"".join(_figure(shown, folder) for shown in entry.files)}</div>')
-            said = f"not made: {html.escape(entry.failure)}" if entry.failure else _measured(entry)
-            parts.append(f'<p class="measured">{said}</p>')
+        parts.append(f'<div class="entries">{"".join(_entry(entry, folder) for entry in section.entries)}</div>')
         parts.append(_compared(section.besides))
     return "\n".join([*parts, "</html>\n"])
+
+
+def _entry(entry: Made, folder: Path) -> str:
+    """Its pictures with what is said of them. Entries of one picture stand side by side."""
+    about = f"<p>{html.escape(entry.about)}</p>" if entry.about else ""
+    pictures = "".join(_figure(shown, folder) for shown in entry.files)
+    said = f"not made: {html.escape(entry.failure)}" if entry.failure else _measured(entry)
+    return (
+        f'<section class="entry{" several" if len(entry.files) > 1 else ""}"><h3>{html.escape(entry.title)}</h3>{about}'
+        f'<div class="row">{pictures}</div><p class="measured">{said}</p></section>'
+    )
 
 
 def _compared(besides: Sequence[Beside]) -> str:
@@ -99,7 +107,8 @@ def _compared(besides: Sequence[Beside]) -> str:
         times = [f"{1e3 * seconds:.1f} ms" for seconds in (of.seconds, of.sampled_seconds)]
         source = f'<a href="{html.escape(beside.address)}">{html.escape(beside.source)}</a>' if beside.address else ""
         cells = [f"<code>{html.escape(beside.program)}</code>", *numbers, *times]
-        rows.append("".join(f"<td>{cell}</td>" for cell in [*cells, f"{html.escape(beside.said)} {source}"]))
+        row = "".join(f'<td class="number">{cell}</td>' for cell in cells)
+        rows.append(f"{row}<td>{html.escape(beside.said)} {source}</td>")
     heads = ("program", "value", "of samples", "derivative", "of their sum", "time", "of samples", "elsewhere")
     head = "".join(f"<th>{name}</th>" for name in heads)
     body = "".join(f"<tr>{row}</tr>" for row in rows)

@@ -66,6 +66,8 @@ def test_each_kind_of_entry_is_made(examples: Path, tmp_path: Path) -> None:
     assert made == {"index.html", "contact.svg", "small-a-step.svg", "small-a-disc.png", "small-a-disc-dr.png",
                     "mine.svg"}  # fmt: skip
     page = (out / "index.html").read_text(encoding="utf-8")
+    # what has two pictures has a row of its own, what has one stands beside others
+    assert page.count('<section class="entry">') == 2 and page.count('<section class="entry several">') == 1
     assert "Small &amp; plain" in page and "quick: True" in page and "largest estimated error 1.0e-09" in page
     sheet = ET.parse(out / "contact.svg").getroot()
     assert len(sheet.findall("{http://www.w3.org/2000/svg}image")) == 4
