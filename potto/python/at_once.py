@@ -31,7 +31,7 @@ from potto.runtime.evaluation.duals import merge
 from potto.runtime.evaluation.functions import Closure
 from potto.runtime.evaluation.machine import WATCHING, Machine
 from potto.runtime.evaluation.record import Record, watched
-from potto.runtime.integration.direct import Batches, Direct, SettledAround, SettledCall
+from potto.runtime.integration.direct import Batches, Direct, SettledAround, SettledCall, unused
 
 # What is not the same when the same is asked again.
 TIMES = {"seconds", "compile_seconds", "plan_seconds", "stats"}
@@ -201,7 +201,7 @@ def together(
     if not isinstance(direct, Direct) or _looked_at():
         return None
     reads = [_read(name, None, value, False) for name, value in zip(term.params, values, strict=True)]
-    batches = direct.batches(_clean(machine), dict(zip(term.params, values, strict=True)))
+    batches = direct.batches(unused(machine), dict(zip(term.params, values, strict=True)))
     if batches is None or None in reads:
         return None
     return Together(
@@ -233,7 +233,7 @@ def at_once(
     if direct is None or len(reads) != len(read):
         return None
     given = {each.name: each.of(arg) for each, arg in zip(reads, args, strict=True)}
-    settled = direct.settled(_clean(machine), dict(zip(term.params, values, strict=True)))
+    settled = direct.settled(unused(machine), dict(zip(term.params, values, strict=True)))
     if settled is None or any(value is None for value in given.values()):
         return None
     with Clock() as clock:
@@ -257,11 +257,6 @@ def _read(name: str, arg: Any, value: Value, dual: bool) -> Read | None:
     if isinstance(value, tuple):
         return Read(name, "dual", moving.t, moving.et, arg[1]) if arg.__class__ is tuple else None
     return Read(name, "number", moving.t, moving.et)
-
-
-def _clean(machine: Machine) -> Machine:
-    """The machine without what a call has left in it."""
-    return machine.apart().changed(record=Record(most_boxes=machine.record.most_boxes))
 
 
 def _looked_at() -> bool:

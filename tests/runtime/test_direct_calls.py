@@ -244,6 +244,21 @@ def test_infinite_answers_near_those_of_before_have_not_converged() -> None:
         assert not value.converged and not slope.converged
 
 
+@pytest.mark.parametrize(
+    ("outside", "before", "after"),
+    [("abs(a)*", 1 - math.e, math.e - 1), ("max(a, 0) + ", 0, 1), ("floor(a) + ", math.inf, 0)],
+)
+def test_kinks_beside_an_integral_are_told_after_calls_near_by(outside: str, before: float, after: float) -> None:
+    """At a = 0, each time that it is asked for: the integral is e - 1, and settled for all a."""
+    slope = potto.grad(potto.compile(f"def f(a, b) {outside}integral [0, 1] exp(b*x) d(x)").f)
+    for _ in range(3):
+        assert not slope(0.3, 1.0).notes
+    for _ in range(2):
+        (note,) = slope(0.0, 1.0).notes
+        assert note.backward == pytest.approx(before, rel=1e-14, abs=0)  # closed forms, to rounding
+        assert note.forward == pytest.approx(after, rel=1e-14, abs=0)
+
+
 def test_where_the_edge_lies_on_a_corner_the_general_way_says_so() -> None:
     f = potto.compile("def f(t) integral [0, 1] [x < t] d(x)").f
     assert not potto.deriv(f)((0.3, 1.0)).notes

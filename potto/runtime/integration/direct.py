@@ -1,9 +1,9 @@
 """Calls that are nothing but integrals of numbers: on the shortest way from arguments to the answer.
 
-Owns `Direct`, `Around` and `direct`. A call from outside mostly leads through a few definitions straight to an integral
-whose plan holds for all parameters and whose orders are proved (`a_priori`), or to arithmetic with such. Which argument
-each parameter of the integral is, is found out once; then nothing is left between the arguments and the rule. What the
-rule does not settle, or what the arguments are not made for, takes the general way, which gives the same.
+Owns `Direct`, `Around`, `direct` and `unused`. A call from outside mostly leads through a few definitions straight to
+an integral whose plan holds for all parameters and whose orders are proved (`a_priori`), or to arithmetic with such.
+Which argument each parameter of the integral is, is found out once; then nothing is left between the arguments and the
+rule. What the rule does not settle, or what the arguments are not made for, takes the general way: that gives the same.
 """
 
 from __future__ import annotations
@@ -197,7 +197,7 @@ class Batches(Struct, frozen=True):
 
     def at(self, env: Mapping[str, Value]) -> tuple[Value, Machine]:
         """The value with its tangents, and the machine that knows what was met. Raises PottoError."""
-        machine = self.machine.apart().changed(record=Record(most_boxes=self.machine.record.most_boxes))
+        machine = unused(self.machine)
         here = dict(self.fixed)
         for name, place in self.given:
             here[name] = env[place]
@@ -223,10 +223,10 @@ class SettledAround(Struct, frozen=True):
             nodes += totals.nodes
             (value, *tangents), (bound, *bounds) = totals.number, totals.error
             found.append(Cell(value, bound, tuple(tangents), tuple(bounds)))
-        machine = self.machine.apart()
+        machine = unused(self.machine)
         with np.errstate(all="ignore"):
             cell = self.around.put_together(machine, env, found)
-        if machine.events or not isinstance(cell, Cell):
+        if machine.events or machine.record.edges or machine.record.shortfalls or not isinstance(cell, Cell):
             return None
         number: list[Any] = [cell.v, *cell.t]
         error: list[Any] = [cell.e, *cell.et]
@@ -263,6 +263,11 @@ class Around(Struct, frozen=True):
         found = [integral.settled(machine, env) for integral in self.integrals]
         parts = tuple(part for part in found if part is not None)
         return SettledAround(self, machine, parts) if len(parts) == len(found) else None
+
+
+def unused(machine: Machine) -> Machine:
+    """The machine without what a call has left in it."""
+    return machine.apart().changed(record=Record(most_boxes=machine.record.most_boxes))
 
 
 def direct(term: Term, linker: Linker) -> Direct | Around | None:
