@@ -136,6 +136,28 @@ def test_where_the_value_is_another_one_on_both_sides_there_is_no_derivative(pro
     assert "lies all along `x`" in str(note)
 
 
+@pytest.mark.parametrize("size", [2, 12, 300])
+def test_of_a_surface_all_along_the_domain_any_batch_tells(size: int) -> None:
+    """1 - 0.3*t + max(t - 1, 0)/2, whose derivatives at t = 1 are -0.3 and 0.2, and t < 1 everywhere else."""
+    f = potto.compile("def f(t) integral [0, 1] (if [x - t*x >= 0] then 0 else x*(t - 1)) + [x > 0.3*t] d(x)").f
+    t = np.append(np.linspace(0.2, 0.9, size - 1), 1.0)
+    answer = potto.grad(f)(t)
+    (note,) = answer.notes
+    assert np.flatnonzero(np.isfinite(note.backward)).tolist() == [size - 1]
+    assert abs(note.backward[-1] + 0.3) <= note.backward_error[-1] + 1e-15
+    assert abs(note.forward[-1] - 0.2) <= note.forward_error[-1] + 1e-15
+    assert np.all(abs(answer.tangent[:-1] + 0.3) <= answer.tangent_error[:-1] + 1e-15)
+
+
+@pytest.mark.parametrize("size", [2, 12, 300])
+def test_where_the_value_jumps_a_member_of_any_batch_has_no_derivative(size: int) -> None:
+    f = potto.compile("def f(t) integral [-1, 1] [x*t <= 0] d(x)").f
+    answer = potto.grad(f)(np.append(np.linspace(0.2, 0.9, size - 1), 0.0))
+    assert answer.notes
+    assert np.flatnonzero(np.isinf(answer.tangent_error)).tolist() == [size - 1]
+    assert np.flatnonzero(~answer.member_converged).tolist() == [size - 1]
+
+
 @pytest.mark.parametrize("program", ["abs(t)", "integral [0, 1] abs(x*t) d(x)", f"{SQUARE} max(x + t*y, x) d(x, y)"])
 def test_the_other_way_the_sides_are_turned_round(program: str) -> None:
     there, back = (rate(program, 0.0, dt).notes[0] for dt in (1.0, -1.0))

@@ -16,7 +16,7 @@ from msgspec.structs import replace
 
 from potto.core.terms import Integral
 from potto.integrate.columns import run_of
-from potto.integrate.events import Degenerate, Events, Fold, Shortfall, TwoSided, Unsearched
+from potto.integrate.events import Along, Degenerate, Events, Fold, Shortfall, TwoSided, Unsearched
 from potto.integrate.pieces import Sums
 from potto.kernels.cells import Array, Bools, Ints
 from potto.kernels.memory import kept
@@ -135,7 +135,7 @@ def _together(problem: Problem, todo: Ints, settled: Settled, found: Whole) -> l
         for group in (np.nonzero(kind)[0] for kind in (plain, *apart)):
             if group.size:
                 with here.among(group) as part:
-                    part.events.take(here.events.of(group, TwoSided, Fold), np.arange(group.size))
+                    part.events.take(here.events.of(group, TwoSided, Fold, Along), np.arange(group.size))
                     own = settled(part, order, sums.pick(group))
                     rough = missing(problem.term, own, problem.machine.settings, part.env)
                     spoilt = rough & rounded(own) if rough.any() else rough
