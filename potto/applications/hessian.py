@@ -17,10 +17,11 @@ from potto.kernels.cells import Cell, Rows, Value, map_cells
 from potto.kernels.errors import wrong_call
 from potto.python.arguments import batch_of
 from potto.python.functions import Function, bound, deriv
-from potto.python.gradients import Gradient, grad, in_given_form
+from potto.python.gradients import grad, in_given_form
 from potto.python.moving import PRIMAL
 from potto.python.named_parameters import Names, parameters_to_vary
 from potto.python.remade import remade
+from potto.python.slopes import Gradient
 from potto.runtime.answers.estimate import Estimate, OneSided
 
 

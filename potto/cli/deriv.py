@@ -16,7 +16,7 @@ from potto.cli.numbers import accounts, add_options, settings_of, show_stats
 
 if TYPE_CHECKING:
     from potto.evaluating.world import World
-    from potto.python.gradients import Gradient
+    from potto.python.slopes import Gradient
 
 SUMMARY = "show the derivative of a definition in symbols, or its gradient in numbers"
 EXAMPLE = """  potto deriv examples/paper/renderer.po renderer

@@ -1,9 +1,9 @@
 """Derivatives of functions of Potto for Python: gradients, Jacobians, products with vectors from either side.
 
-Owns `grad`, `value_and_grad`, `jacobian`, `vjp`, `jvp` and `Gradient`. By many parameters it is differentiated in
-reverse, by few forward: that is chosen here, and both give the same. What is differentiated by is named; without names
-it is the first parameter. All numbers come with their errors, and arrays broadcast as in a call. Second derivatives
-are in `applications/hessian`.
+Owns `grad`, `value_and_grad`, `jacobian`, `vjp` and `jvp`; their answers are in `slopes`. By many parameters it is
+differentiated in reverse, by few forward: that is chosen here, and both give the same. What is differentiated by is
+named; without names it is the first parameter. All numbers come with their errors, and arrays broadcast as in a call.
+Second derivatives are in `applications/hessian`.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ from potto.python.moving import each_moving, moved, own, size, with_own, with_pl
 from potto.python.named_parameters import Names, parameters_to_vary
 from potto.python.remade import remade
 from potto.python.sided import with_sides
+from potto.python.slopes import Gradient, Slopes
 from potto.python.tiles import LEAST
-from potto.runtime.answers.arithmetic import Pair
 from potto.runtime.answers.estimate import Estimate
 from potto.runtime.answers.named import named
 from potto.runtime.answers.shown import named_answer
@@ -46,30 +46,6 @@ from potto.types.types import REAL
 MANY = 12
 SWEEP = 6  # tangents that cost what a sweep does, of which each number of an answer takes one
 NOTHING: Swept = (None, None)
-
-
-class Gradient(Estimate, frozen=True, eq=False):
-    """An estimate with derivatives by several parameters: `gradient["c"]`, or `tangent` for all of them.
-
-    as_records: the derivatives and their errors as they are shown, where records were given as dicts.
-    """
-
-    wrt: tuple[str, ...] = ()
-    as_records: Any = None
-
-    @property
-    def _shown(self) -> Pair:
-        if self.as_records is None:
-            return super()._shown
-        return (self.value, self.as_records[0]), (self.error, self.as_records[1])
-
-    def __getitem__(self, name: Any) -> Any:
-        """The derivative by a parameter; at a place, the value (0) or the derivatives (1) as an estimate."""
-        if not isinstance(name, str):
-            return super().__getitem__(name)
-        if name not in self.wrt:
-            raise KeyError(name)
-        return self.tangent if len(self.wrt) == 1 else self.tangent[self.wrt.index(name)]
 
 
 @overload
@@ -101,9 +77,8 @@ def value_and_grad(function: Function, wrt: Names = None) -> Callable[..., tuple
     gradient = grad(function, wrt)
 
     def pair(*args: Any, **kwargs: Any) -> tuple[Estimate, Estimate]:
-        found = _plain(gradient(*args, **kwargs))
-        value = replace(found, tangent=None, tangent_error=None)
-        return value, replace(value, value=found.tangent, error=found.tangent_error)
+        found = gradient(*args, **kwargs)
+        return replace(_plain(found), tangent=None, tangent_error=None), Slopes.of(found)
 
     return pair
 
@@ -397,4 +372,4 @@ def _numbers(value: Value) -> bool:
     return isinstance(value, Cell) or (isinstance(value, tuple | list) and all(map(_numbers, value)))
 
 
-__all__ = ["Gradient", "GradientFunction", "grad", "jacobian", "jvp", "value_and_grad", "vjp"]
+__all__ = ["GradientFunction", "grad", "jacobian", "jvp", "value_and_grad", "vjp"]

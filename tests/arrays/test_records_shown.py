@@ -84,3 +84,15 @@ def test_an_answer_at_the_prompt_keeps_its_fields() -> None:
     session.run(CAMERAS)
     assert [valued.text for valued in session.run("two")] == [valued.text for valued in session.run("_")]
     assert session.run("_[1].focal")[-1].text == "3"
+
+
+def test_derivatives_by_a_record_that_is_given_as_a_dict() -> None:
+    """Alone as beside the value: by the record's name, and still a dict."""
+    scaled = potto.compile("record Lens(focal: Real, eye: Real)\ndef f(c: Lens, t) c.focal^2*t + c.eye\n").f
+    lens = {"focal": 2.0, "eye": 1.0}
+    value, slopes = potto.value_and_grad(scaled)(lens, 3.0)
+    assert value == 13
+    assert slopes.value == {"focal": 12, "eye": 1}
+    assert str(slopes) == "Lens(focal=12, eye=1)"
+    assert str(potto.value_and_grad(scaled, ["c", "t"])(lens, 3.0)[1]) == "(Lens(focal=12, eye=1), 4)"
+    assert str(pickle.loads(pickle.dumps(slopes))) == str(slopes)
