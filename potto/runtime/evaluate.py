@@ -17,7 +17,7 @@ from potto.calculus.surfaces.discontinuities import TooDeep
 from potto.core.printer import abridged, format_term
 from potto.core.terms import Data, Integral, Sum, Term
 from potto.diagnostics import PottoError, Related
-from potto.integrate.events import INFINITE, ROUGH, Shortfall
+from potto.integrate.events import INFINITE, NO_VALUE, NOT_A_NUMBER, ROUGH, Shortfall
 from potto.kernels import errors
 from potto.kernels.cells import Cell, Number, Rows, Value, all_cells
 from potto.kernels.making import counts
@@ -277,8 +277,10 @@ def _missing(flat: list[tuple[Any, Any]], machine: Machine) -> Shortfalls:
         found = missed(number, error, within, settings, drawn)
         if not found or any(where is True for where in before.values()):
             continue
-        if not record.methods:
-            found.pop(INFINITE, None)  # of 1/0 no integral is to blame
+        if not record.methods:  # of 1/0, and of infinity times 0, no integral is to blame
+            found.pop(INFINITE, None)
+            if NO_VALUE in found:
+                merged(found, {NOT_A_NUMBER: found.pop(NO_VALUE)})
         if found and any(rough(answer, settings.rtol, settings.atol) for answer in record.used.values()):
             found = {ROUGH: np.logical_or.reduce(list(found.values()))}
         told = converged_members(before, np.shape(number))

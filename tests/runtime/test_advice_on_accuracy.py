@@ -71,3 +71,9 @@ def test_an_infinite_derivative_has_converged_to_nothing() -> None:
     for many in (potto.grad(root)(at), potto.deriv(root)(dual)):
         assert many.member_converged.tolist() == [False, True]
     assert potto.grad(root)(4.0).converged
+
+
+def test_no_integral_is_to_blame_where_there_is_none() -> None:
+    """The derivative of sqrt(k*x) by x at k = 0 is infinity times 0."""
+    one = potto.grad(potto.compile("def f(k, x) sqrt(k*x)\n").f, "x")(0.0, 1.0)
+    assert not one.converged and [why.message for why in one.shortfalls] == ["the value is not a number"]
