@@ -31,11 +31,39 @@ def numerator(term: Term, name: str) -> Term | None:
 
     A factor of the numerator that is one of the denominator too is left out.
     """
+
+    def below(node: Term) -> tuple[Term, ...]:
+        return _parts(node) if name in node.free else ()
+
+    order = postorder(term, below=below)
+    if not any(below(node) and _divides(node) for node in order):
+        return None
     memo: dict[Term, _Fraction] = {}
-    for node in postorder(term):
+    for node in order:
         memo[node] = _node(node, memo) if name in node.free else _Fraction(node, Counter())
     found = memo[term]
     return found.top if found.below else None
+
+
+def _parts(node: Term) -> tuple[Term, ...]:
+    """What `_node` makes a fraction of, none of what it leaves as it is."""
+    match node:
+        case Prim(op="add" | "neg" | "mul" | "div", args=args):
+            return args
+        case Prim(op="pow", args=(base, Const(value=power))) if power.is_integer() and abs(power) <= _HIGHEST:
+            return (base,)
+        case _:
+            return ()
+
+
+def _divides(node: Term) -> bool:
+    match node:
+        case Prim(op="div"):
+            return True
+        case Prim(op="pow", args=(_, Const(value=power))):
+            return power < 0
+        case _:
+            return False
 
 
 def _node(node: Term, memo: dict[Term, _Fraction]) -> _Fraction:
