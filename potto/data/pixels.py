@@ -2,8 +2,8 @@
 
 Owns `picture_head`, which finds sizes in the bytes of a sound file, and `picture`, which needs Pillow for all but
 colours of 16 bits: of those Pillow keeps 8, which is what interlaced ones are left with. A grey picture is an array of
-numbers, a coloured one of rows of three. Transparency is dropped, palettes are looked up; pixels stay as they are
-stored, whatever a note in the file says about how to turn them.
+numbers, a coloured one of rows of three. Transparency is dropped, palettes are looked up; a JPEG is turned as a note
+in it says (the orientation of Exif 2.32, 4.6.4): as whoever looks at it sees it.
 """
 
 from __future__ import annotations
@@ -29,18 +29,27 @@ _GREY, _GREY_ALPHA = 0, 4  # colour types of PNG
 _FRAMES = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
 _END = b"\xff\xd9"  # of a JPEG; within its pixels no such bytes stand beside each other
 _BARE = frozenset({0x01, *range(0xD0, 0xD9)})  # segments without a length
+# What Pillow calls the turn that an orientation asks for.
+_TURNS = {
+    2: "FLIP_LEFT_RIGHT", 3: "ROTATE_180", 4: "FLIP_TOP_BOTTOM", 5: "TRANSPOSE", 6: "ROTATE_270", 7: "TRANSVERSE",
+    8: "ROTATE_90",
+}  # fmt: skip
+_ON_THEIR_SIDE = 5  # orientations from which on rows become columns
+_EXIF, _NOTES, _ORIENTATION = b"Exif\0\0", 0xE1, 0x0112
 _AGAIN = "write the picture again as PNG or JPEG"
 
 
 class _Head(Struct, frozen=True):
     """Sizes, whether there are colours, and the colour type of a PNG whose values Pillow would cut to 8 bits. sound:
-    the file is whole, as far as that is seen without Pillow."""
+    the file is whole, as far as that is seen without Pillow. turn: to be done to what is stored; sizes are those after
+    it."""
 
     height: int
     width: int
     coloured: bool
     deep: int | None = None
     sound: bool = True
+    turn: str | None = None
 
     @property
     def item(self) -> Item:
@@ -83,7 +92,7 @@ def _png(content: bytes) -> _Head:
 
 
 def _jpeg(content: bytes) -> _Head:
-    at = 2
+    at, orientation = 2, 1
     while at + 4 <= len(content) and content[at] == 0xFF:
         mark = content[at + 1]
         if mark == 0xFF or mark in _BARE:  # filling, or nothing but a mark
@@ -91,9 +100,29 @@ def _jpeg(content: bytes) -> _Head:
             continue
         if mark in _FRAMES and at + 10 <= len(content):
             height, width, channels = struct.unpack(">HHB", content[at + 5 : at + 10])
-            return _Head(height, width, channels > 1, sound=content.find(_END, at) >= 0)
-        at += 2 + struct.unpack(">H", content[at + 2 : at + 4])[0]
+            if orientation >= _ON_THEIR_SIDE:
+                height, width = width, height
+            whole = content.find(_END, at) >= 0
+            return _Head(height, width, channels > 1, sound=whole, turn=_TURNS.get(orientation))
+        (size,) = struct.unpack(">H", content[at + 2 : at + 4])
+        if mark == _NOTES and content.startswith(_EXIF, at + 4):
+            orientation = _orientation(content[at + 4 + len(_EXIF) : at + 2 + size])
+        at += 2 + size
     raise malformed("the JPEG file does not say how large the picture is", hint=_AGAIN)
+
+
+def _orientation(notes: bytes) -> int:
+    """The orientation among notes, which are a TIFF file; 1, as it is stored, where there is none."""
+    order = {b"II": "<", b"MM": ">"}.get(notes[:2])
+    if order is None or len(notes) < 8:
+        return 1
+    (at,) = struct.unpack_from(order + "I", notes, 4)
+    count = struct.unpack_from(order + "H", notes, at)[0] if at + 2 <= len(notes) else 0
+    for entry in range(at + 2, min(at + 2 + 12 * count, len(notes) - 11), 12):
+        tag, _, _, value = struct.unpack_from(order + "HHIH", notes, entry)
+        if tag == _ORIENTATION:
+            return value if value in _TURNS else 1
+    return 1
 
 
 def _pixels(content: bytes, head: _Head) -> npt.NDArray[np.float64]:
@@ -106,6 +135,8 @@ def _pixels(content: bytes, head: _Head) -> npt.NDArray[np.float64]:
     try:
         with Image.open(io.BytesIO(content), formats=("PNG", "JPEG")) as image:
             plain = _converted(image, head)
+            if head.turn is not None:
+                plain = plain.transpose(Image.Transpose[head.turn])
             largest = 65535.0 if plain.mode.startswith("I") else 255.0
             found = np.ascontiguousarray(plain, np.float64)
     except (OSError, SyntaxError, ValueError, EOFError, struct.error, Image.DecompressionBombError) as error:

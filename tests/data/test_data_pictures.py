@@ -81,6 +81,32 @@ def test_jpeg(shape: tuple[int, ...], item: object, how: dict[str, Any]) -> None
     assert np.allclose(light(content, "p.jpg"), 200 / 255, rtol=0, atol=0.01)
 
 
+@pytest.mark.parametrize("order", ["<", ">"])
+@pytest.mark.parametrize("orientation", range(10))
+def test_a_jpeg_is_turned_as_its_notes_say(orientation: int, order: str) -> None:
+    """Against Pillow's own way; what is no orientation turns nothing."""
+    pixels = np.zeros((16, 24, 3), np.uint8)
+    pixels[:8, :16] = (250, 120, 30)
+    mark = b"II*\0" if order == "<" else b"MM\0*"
+    make, turn = (
+        struct.pack(order + "HHIHH", tag, 3, 1, value, 0) for tag, value in ((0x0100, 9), (0x0112, orientation))
+    )
+    notes = b"Exif\0\0" + mark + struct.pack(order + "IH", 8, 2) + make + turn + bytes(4)
+    content = written(pixels, "JPEG", exif=notes)
+    with Image.open(io.BytesIO(content)) as image:
+        wanted = np.asarray(pytest.importorskip("PIL.ImageOps").exif_transpose(image)) / 255
+    assert shape_of(Path("p.jpg"), content) == Sizes(wanted.shape[:2], NumberRow(3))
+    assert np.array_equal(light(content, "p.jpg"), wanted)
+
+
+@pytest.mark.parametrize("kept", range(0, 20, 3))
+def test_notes_that_are_cut_off_turn_nothing(kept: int) -> None:
+    notes = b"Exif\0\0" + (b"II*\0" + struct.pack("<IHHHIHH", 8, 1, 0x0112, 3, 1, 6, 0))[:kept]
+    content = written(np.zeros((4, 6, 3), np.uint8), "JPEG", exif=notes)
+    assert shape_of(Path("p.jpg"), content) == Sizes((4, 6), NumberRow(3))
+    assert light(content, "p.jpg").shape == (4, 6, 3)
+
+
 def test_jpeg_for_printing() -> None:
     content = written(np.full((4, 4, 3), 250, np.uint8), "JPEG", mode="CMYK")
     assert shape_of(Path("p.jpg"), content) == Sizes((4, 4), NumberRow(3))
