@@ -145,6 +145,11 @@ class OneSidedDerivatives(Event, frozen=True):
     def sides(self) -> tuple[Array, Array, Array, Array]:
         return self.backward, self.forward, self.backward_error, self.forward_error
 
+    @property
+    def endless(self) -> bool:
+        """Whether one is infinite: what it is of jumps there, or leaves it with an infinite slope."""
+        return bool(np.isinf(self.backward).any() or np.isinf(self.forward).any())
+
     def at(self, places: Ints) -> Event:
         return OneSidedDerivatives(self.cause, *(side[..., places] for side in self.sides))
 

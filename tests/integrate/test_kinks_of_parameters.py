@@ -293,3 +293,43 @@ def test_a_surface_that_does_not_vary_lies_all_along(surface: str) -> None:
     f = potto.compile(f"def f(t) {program}\n").f
     assert (f(-0.5).value, f(0.5).value) == (0.0, 1.0)
     assert abs(potto.hessian(f)(0.5).value) <= 1e-15
+
+
+JUMPS = potto.compile("""
+def i(t) integral [0, 1] [z*(t - 1) > 0] d(z)
+def ramp(t) (t - 1)*i(t)
+def beside(t) (t - 1)*i(t) + t^2
+def scaled(t) cos(t)*i(t)
+def spike(t) i(t) + i(2 - t)
+def flat(t) (t - 1)^2*i(t)
+def body(t) integral ([0, 1], [0, 1], [0, 1]) (if [z*(1 - t) >= 0] then 0 else x*(t - 1)) d(x, y, z)
+""")
+
+
+@pytest.mark.parametrize(
+    ("name", "sides"),
+    [
+        ("ramp", (0, 1)),
+        ("beside", (2, 3)),
+        ("scaled", (0, math.inf)),  # cos(1) beyond, 0 at the place
+        ("spike", (-math.inf, math.inf)),  # 1 on both sides, 0 at the place
+        ("body", (0, 0.5)),
+    ],
+)
+def test_what_is_made_of_an_integral_that_jumps_has_the_derivatives_of_both_sides(
+    name: str, sides: tuple[float, float]
+) -> None:
+    """As a part of a sum or product, and where an integral is taken apart into a product; alone and in a batch. The
+    jump of the part is one of its value: what it is at the place leads to no derivative beside it."""
+    function = potto.deriv(getattr(JUMPS, name))
+    (note,) = function((1.0, 1.0)).notes
+    assert (note.backward, note.forward) == pytest.approx(sides, rel=1e-12, abs=1e-12)
+    (note,) = function((np.array([1.0, 0.5, 1.0]), 1.0)).notes
+    assert note.backward[[0, 2]] == pytest.approx(sides[:1] * 2, rel=1e-12, abs=1e-12)
+    assert note.forward[[0, 2]] == pytest.approx(sides[1:] * 2, rel=1e-12, abs=1e-12)
+
+
+def test_a_jump_that_is_multiplied_away_leaves_one_derivative() -> None:
+    found = potto.deriv(JUMPS.flat)((1.0, 1.0))
+    assert found.converged and not found.notes
+    assert found.tangent == pytest.approx(0, abs=1e-15)

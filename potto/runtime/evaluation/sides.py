@@ -30,6 +30,7 @@ from potto.kernels.cells import (
     pad,
 )
 from potto.kernels.errors import Coincidence
+from potto.runtime.answers.convergence import over, widest
 from potto.runtime.evaluation.beside import SAME as ALIKE
 from potto.runtime.evaluation.beside import Parts, approached, moved, one_direction, parameter_step
 from potto.runtime.evaluation.linker import Linker
@@ -67,7 +68,7 @@ def as_a_whole(machine: Machine, term: Term, given: Value, run: Run) -> Value:
     there: Any = (...,) if members is None else (..., members)
     v, e, slopes, off = _numbers(value, machine.directions, batch)
     here = v[there], e[there], slopes[there], off[there]
-    jumps = any(edge.cause.jump for edge in met)
+    jumps = any(edge.cause.jump or edge.endless for edge in met)
     del record.edges[before[1] :]  # what is noted is told of the whole
     try:
         sides = _both(machine, given, members, lambda m, own, side: _beside(m, own, side, run, here, jumps))
@@ -119,8 +120,10 @@ def _few(met: Any, batch: tuple[int, ...]) -> Ints | None:
 
 
 def _both(machine: Machine, given: Value, members: Ints | None, beside: Callable[[Machine, Value, int], Side]) -> Sides:
-    """What `beside` finds on either side for some members by themselves. The record is left as it was."""
-    record = machine.record
+    """What `beside` finds on either side for some members by themselves. The record is left as it was, but that what is
+    added up there counts for how much may be off."""
+    record, batch = machine.record, _batch(given)
+    allowed: Any = 0.0
     kept = record.shortfalls, record.edges, record.within
     try:
         with nullcontext(machine.apart()) if members is None else machine.among(members) as apart:
@@ -129,8 +132,13 @@ def _both(machine: Machine, given: Value, members: Ints | None, beside: Callable
             for side in (-1, 1):
                 record.shortfalls, record.edges, record.within = {}, [], 0.0
                 sides.append(beside(apart, given, side))
+                allowed = widest(allowed, record.within)
     finally:
         record.shortfalls, record.edges, record.within = kept
+    if members is not None:
+        own, allowed = allowed, np.zeros(batch)
+        allowed[members] = over(own, members.shape)
+    record.within = widest(record.within, allowed)
     return sides[0], sides[1]
 
 
