@@ -38,10 +38,12 @@ from potto.core.terms import (
     Tuple,
     Var,
     array,
+    children,
     fold,
     integral,
     lam,
     postorder,
+    rebuild,
     sum_,
     var,
 )
@@ -91,6 +93,19 @@ def format_term(term: Term, limit: int = 20_000) -> str:
         text = _node(node if not names else _renamed(node, names), texts)
         texts[node] = text if len(text.text) <= limit else _Text(LEFT_OUT, _ATOM)
     return texts[term].text
+
+
+def plainly_bound(term: Term) -> Term:
+    """The same term with names for its copies of bound variables that a program can write, as `format_term` has them:
+    whoever writes a part of it has the names of the whole."""
+    nodes = tuple(postorder(term))
+    names = _written(nodes)
+    if not names:
+        return term
+    found: dict[Term, Term] = {}
+    for node in nodes:
+        found[node] = _renamed(rebuild(node, tuple(found[child] for child in children(node))), names)
+    return found[term]
 
 
 def _written(nodes: tuple[Term, ...]) -> Mapping[str, str]:

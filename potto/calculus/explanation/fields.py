@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from potto.core.printer import format_term
+from potto.core.printer import format_term, plainly_bound
 from potto.core.terms import (
     ZERO,
     App,
@@ -47,6 +47,7 @@ def parameter_types(type: Type) -> dict[str, Type]:
 
 def named_fields(db: Database, term: Term, parameters: Mapping[str, Type]) -> Term:
     """The same with the fields of records as names: `camera.focal` is a variable of that name."""
+    term = plainly_bound(term)
     types: dict[Term, Type | None] = {}
     memo: dict[Term, Term] = {}
     parameters = {**parameters, **_states(db, term, parameters)}
