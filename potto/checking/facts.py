@@ -14,10 +14,10 @@ from msgspec import Struct
 from potto.calculus.checking.conditions import conditions_of
 from potto.calculus.checking.diffeo import exported
 from potto.calculus.checking.guards import unguarded
+from potto.calculus.explanation.decimals import in_decimals
 from potto.calculus.explanation.explain import describe
 from potto.calculus.explanation.fields import fields_of
 from potto.calculus.explanation.layout import WIDTH, DerivativeText, IntegralText, Show, meets
-from potto.calculus.explanation.readable import in_decimals
 from potto.calculus.explanation.symbols import Rewrite
 from potto.calculus.inlining.expand import expanded
 from potto.calculus.surfaces.branch_cuts import opened

@@ -20,10 +20,11 @@ from potto.calculus.differentiation.dual import Differentiator
 from potto.calculus.differentiation.higher_order import moving_deltas
 from potto.calculus.differentiation.level_sets import level_set
 from potto.calculus.explanation.continuity import continuous
+from potto.calculus.explanation.decimals import in_decimals
 from potto.calculus.explanation.fields import fields_of
 from potto.calculus.explanation.layout import DerivativeText, IntegralText, SurfaceText
 from potto.calculus.explanation.plain_names import plainly_named
-from potto.calculus.explanation.readable import ReadableParts, in_decimals, readable
+from potto.calculus.explanation.readable import ReadableParts, readable
 from potto.calculus.explanation.symbols import NoFormula, Rewrite, Words, over_functions
 from potto.calculus.inlining.expand import Resolve, heads_of
 from potto.calculus.solving.pivots import NoClosedForm, SurfaceRoot, pivots

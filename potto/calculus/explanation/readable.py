@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from fractions import Fraction
-from math import gcd, inf, isfinite, isqrt, lcm, prod, ulp
+from math import gcd, inf, isfinite, lcm
 
 from msgspec import Struct
 
@@ -18,6 +18,7 @@ from potto.calculus.algebra.rational_form import Rational, normal
 from potto.calculus.explanation.alternatives import in_one
 from potto.calculus.explanation.brackets import Inequality, between, conditions, fewer, opposite, plainer
 from potto.calculus.explanation.brackets import bracket as bracket_of
+from potto.calculus.explanation.decimals import root_of_number
 from potto.calculus.explanation.factors import Factors, factored, is_tangent, written
 from potto.calculus.surfaces.branch_assignment import box_of, with_index
 from potto.core.polynomials import Monomial, Polynomial, shared_by, without
@@ -56,7 +57,6 @@ from potto.core.terms import (
 
 _Binder = Integral | Sum | Array | Fold
 _ARITHMETIC = ("add", "neg", "mul", "div", "pow", "sqrt", "exp")
-_DIGITS = 15  # of a number that may have been rounded
 _LONG = 100_000  # characters of a formula of which nobody will read what can be made, beyond which nothing is tried
 _MANY = 60  # nodes of what is expanded
 _SUMMANDS = 24
@@ -82,42 +82,6 @@ def readable(
         return term
     work = _Work(tangents, _bound(term) | frozenset(box or ()), progress or ReadableParts())
     return _decided(transform(term, lambda _, new: work.node(new)), box or {}, work)
-
-
-def in_decimals(term: Term) -> Term:
-    """The same term with its numbers as a person would write them: 0.1 for 0.3 - 0.2, of which a computer makes
-    0.09999999999999998."""
-
-    def change(_: Term, new: Term) -> Term:
-        match new:
-            case Const(name=None, value=value) if len(repr(value)) > _DIGITS:
-                short = float(f"{value:.13g}")
-                return const(short) if abs(short - value) <= 4 * ulp(value) else new
-            case Prim(op="add" | "mul" as op, args=args) if all(map(_is_number, args)):
-                numbers = [Fraction(repr(arg.value)) for arg in args if isinstance(arg, Const)]
-                return const(float(sum(numbers) if op == "add" else prod(numbers)))
-            case Prim(op="neg", args=(Const(name=None, value=value),)):
-                return const(-value)
-            case Prim(op="neg", args=(Prim(op="mul", args=(Const(name=None, value=value), *rest)),)) if value < 0:
-                return mul(const(-value), *rest)
-            case _:
-                return new
-
-    return transform(term, change)
-
-
-def _root(node: Prim) -> Term:
-    """0.2 for the root of 0.04, of which a computer makes 0.2 as well, if not of what it has made of 0.2*0.2."""
-    (inside,) = node.args
-    if not _is_number(inside) or not isinstance(inside, Const) or inside.value < 0:
-        return node
-    square = Fraction(repr(inside.value))
-    root = Fraction(isqrt(square.numerator), isqrt(square.denominator))
-    return const(float(root)) if root * root == square else node
-
-
-def _is_number(term: Term) -> bool:
-    return isinstance(term, Const) and term.name is None and isfinite(term.value)
 
 
 def _bound(term: Term) -> frozenset[str]:
@@ -179,7 +143,7 @@ class _Work:
 
     def node(self, node: Term) -> Term:
         if isinstance(node, Prim) and node.op == "sqrt":
-            node = _root(node)
+            node = root_of_number(node)
         match node:
             case Prim(op=op) if op in _ARITHMETIC:
                 key = node, self.tangents, self.inside

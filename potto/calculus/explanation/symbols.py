@@ -12,7 +12,8 @@ from msgspec import Struct
 
 from potto.calculus.algebra.radicals import NAN
 from potto.calculus.algebra.ranges import Box
-from potto.calculus.explanation.readable import ReadableParts, in_decimals, readable
+from potto.calculus.explanation.decimals import in_decimals
+from potto.calculus.explanation.readable import ReadableParts, readable
 from potto.calculus.surfaces.trace import spine
 from potto.core.printer import LEFT_OUT, format_term
 from potto.core.simplify import simplify
