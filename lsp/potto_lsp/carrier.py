@@ -13,7 +13,7 @@ their cancellation, requests and notifications to the client, the codes of error
 - Requests of both sides share a table by id, so that a client that counts as the server does gets wrong answers.
 - What a synchronous handler returns is its answer at once, so that it cannot be cancelled: a handler may return a
   future here. `set_result` on a future that was cancelled meanwhile raises: see `settle`.
-- A handler's failure is sent with a traceback, and one of the protocol without its data.
+- A handler's failure is sent with a traceback, one of the protocol without its data, and both as objects of attrs.
 - `_send_data` waits for a client that does not read, writes every message into the log, sends `params: null`, takes
   results apart object by object, and keeps what it cannot send to itself: `wire.Outbox` writes.
 """
@@ -26,20 +26,18 @@ from concurrent.futures import Future, InvalidStateError
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any, cast
 
-from potto_lsp import errors, later, lazy_types
+from potto_lsp import errors, later
 from potto_lsp.errors import RequestError
 from potto_lsp.wire import BadMessage, framed
 
 later.postpone()
-lazy_types.load()
 
-from lsprotocol.types import ResponseError  # noqa: E402  # it must be there already, like all that is postponed
-from pygls.exceptions import JsonRpcException  # noqa: E402
-from pygls.protocol import JsonRPCProtocol  # noqa: E402
+from pygls.protocol import JsonRPCProtocol  # noqa: E402  # what is to wait must be said before
 from pygls.server import JsonRPCServer  # noqa: E402
 
 if TYPE_CHECKING:
     from cattrs import Converter
+    from lsprotocol.types import ResponseError
 
 logger = logging.getLogger(__name__)
 Id = int | str
@@ -68,6 +66,9 @@ class Protocol(JsonRPCProtocol):
 
     def structure_message(self, data: dict[str, Any]) -> Any:
         return data
+
+    def get_message_type(self, method: str) -> type[Any]:
+        return dict
 
     def handle_message(self, message: Any) -> None:
         if isinstance(message, BadMessage):
@@ -163,19 +164,18 @@ class Protocol(JsonRPCProtocol):
 
     def fail(self, id: Id | None, code: int, message: str, data: Any = None) -> None:
         """Answer with an error. `id` is None if the request had none that could be read."""
-        self._send_response(cast(Id, id), error=JsonRpcException(message, code, data).to_response_error())
+        error = {"code": code, "message": message}
+        self._send_data({"id": id, "error": error if data is None else {**error, "data": data}})
 
     def _send_response(self, msg_id: Id, result: Any = None, error: ResponseError | None = None) -> None:
         if error is None:
             self._send_data({"id": msg_id, "result": result})
-            return
-        said = {"code": error.code, "message": error.message}
-        self._send_data({"id": msg_id, "error": said if error.data is None else {**said, "data": error.data}})
+        else:
+            self.fail(msg_id, error.code, error.message, error.data)
 
     def _send_data(self, data: Any) -> None:
-        if not isinstance(data, dict):  # pygls' own requests and notifications
-            told = {name: getattr(data, name, None) for name in ("id", "method", "params")}
-            data = {name: value for name, value in told.items() if value is not None}
+        if data.get("params", data) is None:
+            del data["params"]
         if self.writer is not None:
             self.writer.write(framed({"jsonrpc": self.VERSION, **data}))
 

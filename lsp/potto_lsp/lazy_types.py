@@ -1,4 +1,4 @@
-"""lsprotocol's classes, made when they are first looked at. Owns `load`.
+"""lsprotocol's classes, made when they are first looked at. Owns `carry_out` and `define`.
 
 `lsprotocol.types` has 554 classes, for each of which attrs writes and compiles methods when the module is imported:
 nine tenths of what importing pygls takes. The server needs a handful of them. While that one module is imported, the
@@ -9,11 +9,9 @@ carried out as they stand.
 from __future__ import annotations
 
 import builtins
-import sys
 from collections.abc import Callable
-from importlib.util import find_spec, module_from_spec
 from threading import RLock
-from types import CodeType, FunctionType
+from types import CodeType, FunctionType, ModuleType
 from typing import Any
 
 NAME = "lsprotocol.types"
@@ -85,25 +83,29 @@ def _fill(cls: type) -> None:
                 setattr(cls, name, value)
 
 
-def load() -> None:
-    """Import `lsprotocol.types`, unless that was done already."""
-    if NAME in sys.modules:
-        return
+def _define(cls: type, **how: Any) -> Any:
+    from attr import define
+
+    return define(cls, **how)
+
+
+define = _later(_define)
+"""attrs' `define` for classes that are made when they are first used."""
+
+
+def carry_out(module: ModuleType) -> None:
+    """Execute `lsprotocol.types`."""
     import attrs
 
-    spec = find_spec(NAME)
-    assert spec is not None and spec.loader is not None, "lsprotocol comes with pygls"
-    module = sys.modules[NAME] = module_from_spec(spec)
+    spec = module.__spec__
+    assert spec is not None and spec.loader is not None
     vars(module)["__builtins__"] = {**vars(builtins), "__build_class__": _empty}
-    define = attrs.define
-    attrs.define = _later(define)
+    attrs.has(object)  # if it was waiting, all of it is there now
+    own = attrs.define
+    attrs.define = define
     try:
         spec.loader.exec_module(module)
-    except BaseException:
-        del sys.modules[NAME]
-        raise
     finally:
-        attrs.define = define
-    setattr(sys.modules["lsprotocol"], "types", module)  # noqa: B010  # as an import does
+        attrs.define = own
     for cls in [cls for cls in _bodies if "__attrs_attrs__" not in vars(cls)]:  # that attrs is not told of
         _fill(cls)

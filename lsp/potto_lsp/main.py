@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import logging
 import os
-import socket
 import sys
 from itertools import chain
 from typing import BinaryIO
@@ -71,6 +70,8 @@ def take_streams() -> tuple[BinaryIO, BinaryIO]:
 
 
 def _serve_socket(address: tuple[str, int]) -> int:
+    import socket  # what a client on standard streams doesn't wait for
+
     with socket.create_server(address) as listener:
         host, port = listener.getsockname()[:2]
         print(f"listening on {host}:{port}", file=sys.stderr, flush=True)

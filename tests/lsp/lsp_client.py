@@ -31,7 +31,8 @@ class Client:
         self.stderr = b""
         self._last = 0
         self.replies: dict[str, Any] = {"workspace/configuration": [{}]}  # what the server is answered; else null
-        threading.Thread(target=self._read, daemon=True).start()
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
         threading.Thread(target=self._complaints, daemon=True).start()
         self.capabilities = EVERYTHING if capabilities is None else capabilities
         self.folder, self.params = folder, params
@@ -110,8 +111,11 @@ class Client:
         return self.wait(seconds)
 
     def wait(self, seconds: float = 10) -> int:
+        """Wait for its end, and until all that it has said is read; the exit status."""
         try:
-            return self.process.wait(seconds)
+            status = self.process.wait(seconds)
+            self._reader.join(seconds)
+            return status
         finally:
             self.process.kill()
 

@@ -14,10 +14,11 @@ from potto_lsp.errors import RequestError
 
 LAZILY = """
 import sys
-from potto_lsp import lazy_types
-lazy_types.load()
-import attrs
+from potto_lsp import later
+later.postpone()
 from lsprotocol import types
+assert types.Position.__name__ == "Position"
+import attrs
 assert attrs.define.__module__.startswith("attr"), "attrs is as it was"
 place = types.Position(1, character=2)
 assert place == types.Position(1, 2) != types.Position(2, 2)
@@ -129,8 +130,9 @@ def test_what_fails_is_an_error_without_a_traceback(made: tuple[Always, Written]
 POSTPONED = """
 import sys
 import potto_lsp.server
-waiting = [name for name in ("asyncio.events", "cattrs.converters", "lsprotocol._hooks", "ssl") if name in sys.modules]
-assert not waiting, waiting
+waiting = {"asyncio.events", "attr", "cattrs.converters", "lsprotocol._hooks", "pygls.workspace", "ssl"}
+loaded = waiting & set(sys.modules)
+assert not loaded and "Position" not in vars(sys.modules["lsprotocol.types"]), loaded
 from lsprotocol import converters, types
 assert converters.get_converter().unstructure(types.Position(1, 2)) == {"line": 1, "character": 2}
 import asyncio
@@ -138,7 +140,21 @@ async def three(): return 3
 assert not asyncio.iscoroutinefunction(len) and asyncio.iscoroutinefunction(three)
 assert asyncio.run(three()) == 3 and asyncio.iscoroutinefunction.__module__ == "asyncio.coroutines"
 import cattrs
+assert cattrs.Converter(), "while it waits, what stands for it makes one"
 assert cattrs.Converter.__module__ == "cattrs.converters" and not hasattr(cattrs, "nothing")
+import attrs
+assert attrs.asdict(types.Position(1, 2)) == {"line": 1, "character": 2} and attrs.define.__module__ == "attr._next_gen"
+from pygls import protocol
+from pygls.lsp.server import LanguageServer
+server = LanguageServer("one", "1")
+assert type(server.protocol) is protocol.LanguageServerProtocol, "of pygls' own server, in the same process"
+@server.feature("textDocument/hover", types.HoverOptions())
+def hover(params): ...
+from pygls.protocol import json_rpc
+assert json_rpc.JsonRPCNotification("a", "2.0", None) == json_rpc.JsonRPCNotification("a", "2.0", None)
+assert json_rpc.ResponseErrorMessage is types.ResponseErrorMessage
+from cattrs.errors import ClassValidationError
+assert json_rpc.ClassValidationError is ClassValidationError and issubclass(ClassValidationError, Exception)
 print("whole")
 """
 
