@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from potto.kernels.cells import Cell, Number, Trace, Value, combined, map_arrays, map_trace
+from potto.kernels.memory import kept
 from potto.kernels.native.points import Pointwise
 from potto.kernels.writing import Runtime
 from potto.kernels.written import Kernel
@@ -58,6 +59,7 @@ def at_points(kernel: Kernel, rt: Runtime, trace: Trace | None, args: list[Value
 
 def in_chunks(kernel: Kernel, rt: Runtime, trace: Trace | None, args: list[Value]) -> Value:
     """The value of a kernel that works point by point, by parts of the first axis."""
+    kept()
     shape = np.broadcast_shapes(*(a.shape for arg in args if isinstance(arg, Cell) for a in arg.arrays()))
     step = max(1, POINTS * shape[0] // int(np.prod(shape)))
     if step >= shape[0]:

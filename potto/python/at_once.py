@@ -2,7 +2,7 @@
 
 Owns `AtOnce` and `at_once`, and for batches `Together` and `together`. Where a call is nothing but an integral, or
 arithmetic with some, and all about them is settled in the region where its numbers lie
-(`integrate/fixed/a_priori.Settled`), the general way has nothing left to find out. What it told once about such a call,
+(`integrate/fixed/settled`), the general way has nothing left to find out. What it told once about such a call,
 it would tell again. A batch of numbers goes from its arrays to the integral.
 """
 
@@ -85,13 +85,15 @@ class Kept(Struct, frozen=True, eq=False):
 
     def estimate(self, number: Sequence[Any], error: Sequence[Any], **told: Any) -> Estimate:
         """The estimate of a value and its tangents."""
-        if self.dual or self.wrt:
-            one = self.dual or len(self.wrt) == 1
-            tangent, off = (number[1], error[1]) if one else (tuple(number[1:]), tuple(error[1:]))
-            told |= {"tangent": tangent, "tangent_error": off}
+        tangent: Any = None
+        off: Any = None
+        if self.dual or len(self.wrt) == 1:
+            tangent, off = number[1], error[1]
+        elif self.wrt:
+            tangent, off = tuple(number[1:]), tuple(error[1:])
         if self.wrt and not self.dual:
             told["wrt"] = self.wrt
-        return self.made(number[0], error[0], method="quadrature", **told)
+        return self.made(number[0], error[0], tangent, off, method="quadrature", **told)
 
 
 class AtOnce(Kept, frozen=True, eq=False):

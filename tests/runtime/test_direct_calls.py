@@ -154,6 +154,26 @@ def test_calls_near_those_of_before_are_answered_the_same(
     assert sum(answered) >= 25 and not all(answered)
 
 
+@pytest.mark.parametrize("backend", BACKENDS)
+@pytest.mark.parametrize("last", [3, 4, 7, 8, 9, 12])
+def test_many_cells_are_added_up_at_once(last: int, backend: str) -> None:
+    """Bands from t/2 to t, t/4 to t/3 and so on: up to six cells with one integrand."""
+    ends = range(1, last)
+    bands = " + ".join(f"{(-1) ** (k + 1)}*[x < t/{k}]" for k in ends)
+    module = potto.compile(f"def f(t) integral [0, 2] exp(-x)*({bands}) d(x)")
+    slope = potto.grad(module.f, "t")
+    with potto.settings(backend=backend):
+        for t in (0.5, 0.5001, 0.4999, 0.5):
+            slope(t)
+        found = module.f.at_once((0.5,), ("t",))
+    assert found is not None and found.converged
+    with mp.workdps(30):
+        value = sum((-1) ** (k + 1) * (1 - mp.exp(-mp.mpf(1) / (2 * k))) for k in ends)
+        rate = sum((-1) ** (k + 1) * mp.exp(-mp.mpf(1) / (2 * k)) / k for k in ends)
+        assert abs(found.value - value) <= found.error < 1e-13
+        assert abs(found.tangent - rate) <= found.tangent_error < 1e-13
+
+
 @pytest.mark.parametrize("shape", [(2,), (30,), (5, 40)])
 @pytest.mark.parametrize("backend", BACKENDS)
 def test_batches_are_answered_the_same_from_the_second_call_on(

@@ -13,31 +13,25 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Mapping, Sequence
-from contextlib import nullcontext
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from msgspec import Struct
 
 from potto.core.terms import children
-from potto.integrate.fixed.alone import RegionPart, machine_code, promotion, summed_alone, summed_by
+from potto.integrate.fixed.alone import machine_code, promotion, summed_alone
 from potto.integrate.fixed.moving_sums import MovingTotals, evaluated, summed
 from potto.integrate.fixed.on_bounds import OnBounds, Place, Tied
 from potto.integrate.fixed.regions import LOOSEST, Path, Places, known, region_of, settle
+from potto.integrate.fixed.settled import SettledRegion, accurate
 from potto.integrate.fixed.straight import CLEAR, StraightIntegral, nothing
 from potto.integrate.pieces import Evaluator, Sums
-from potto.integrate.rules.gauss import EPS
 from potto.integrate.rules.proved_orders import FrameCell as Stretch
 from potto.integrate.rules.proved_orders import Region
 from potto.kernels.cells import Cell, Value
 from potto.kernels.making import making
-from potto.kernels.native.objects import Loaded
-from potto.kernels.native.promotion import Promotion
 
 MOST_CELLS, MOST_NODES = 24, 60_000
-# How far off a rule may be for a sum that cancels, as a part of what it is when nothing does.
-NOISE = 1e-12
 
 # Where the cells are
 
@@ -208,7 +202,7 @@ def _between(
     if totals is None:
         return None
     machine.count(totals.nodes)
-    return _accurate(totals, _truncation(plan, proof[0], machine.directions, env), machine.rtol, machine.atol)
+    return accurate(totals, _truncation(plan, proof[0], machine.directions, env), machine.rtol, machine.atol)
 
 
 def _proved(
@@ -263,40 +257,7 @@ def _summed(plan: StraightIntegral, machine: Evaluator, env: dict[str, Value]) -
     if totals is None:
         return None
     machine.count(totals.nodes)
-    return _accurate(totals, _truncation(plan, region, machine.directions, env), machine.rtol, machine.atol)
-
-
-class SettledRegion(Struct, frozen=True, eq=False):
-    """An integral all over a region of its parameters, which run along tangents that stay the same.
-
-    box: per parameter, between which numbers. truncation: a bound of what the rule leaves out, of the value and each
-    tangent. faces: integrands with their functions of machine code; none where numpy adds up: for good, or until
-    the function that it stands in for is due.
-    """
-
-    plan: StraightIntegral
-    region: Region
-    machine: Evaluator
-    box: tuple[tuple[str, float, float], ...]
-    truncation: list[float]
-    faces: list[tuple[RegionPart, Loaded]]
-    awaited: Promotion | None
-
-    def at(self, env: dict[str, Any]) -> MovingTotals | None:
-        """The value and its tangents; None outside of the region, and where they are not accurate enough."""
-        for name, low, high in self.box:
-            if not low <= env[name].v <= high:
-                return None
-        plan, machine = self.plan, self.machine
-        if self.faces:
-            found = summed_by(self.faces, env)
-        elif self.awaited is not None and self.awaited.due:
-            return None
-        else:
-            with np.errstate(all="ignore"), nullcontext() if self.awaited is None else self.awaited.by_numpy():
-                frame = evaluated(plan.frames[0], machine.tracking(), env)
-                found = summed(plan.variables, plan.frames, self.region, machine, env, frame)
-        return None if found is None else _accurate(found, self.truncation, machine.rtol, machine.atol)
+    return accurate(totals, _truncation(plan, region, machine.directions, env), machine.rtol, machine.atol)
 
 
 @np.errstate(all="ignore")
@@ -314,10 +275,8 @@ def settled(plan: StraightIntegral, machine: Evaluator, env: dict[str, Value]) -
     awaited = promotion(plan, region, machine, env) if faces is None else None
     if awaited is not None and awaited.due:
         return None
-    box = tuple((name, lo, hi) for name, (lo, hi) in found.box.items())
-    return SettledRegion(
-        plan, region, machine, box, _truncation(plan, region, machine.directions, env), faces or [], awaited
-    )
+    truncation = _truncation(plan, region, machine.directions, env)
+    return SettledRegion.of(plan, region, machine, found.box, truncation, faces, awaited)
 
 
 def _decided(
@@ -356,16 +315,3 @@ def _truncation(plan: StraightIntegral, region: Region, directions: int, env: Ma
             speeds[name] = 0.0 if t is None else float(t)
         bounds.append(region.rate(speeds))
     return bounds
-
-
-def _accurate(found: MovingTotals, truncation: Sequence[float], rtol: float, atol: float) -> MovingTotals | None:
-    """The answer, if it is as accurate as was asked for, or as its rounding allows."""
-    errors, unit, least, part = [], EPS * max(found.gross), 0.5 * atol, 0.5 * rtol
-    for x, rounding, gross, beyond in zip(found.number, found.error, found.gross, truncation, strict=True):
-        asked = part * abs(x)
-        if asked < least:
-            asked = least
-        if not rounding <= asked or not (beyond <= asked or beyond <= NOISE * gross or beyond <= unit):
-            return None
-        errors.append(rounding + beyond)
-    return MovingTotals(found.number, errors, found.gross, found.nodes)

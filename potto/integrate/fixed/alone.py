@@ -8,7 +8,8 @@ once: tables of nodes, rows, room for what comes out.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+import struct
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -40,11 +41,12 @@ Read = tuple[str, int]
 class _Layout(Struct):
     """What one call of the function for some cells reads and writes.
 
-    frame, constants: what it takes, which lies at `where`; tables: what the frame points to. out: the part that counts
-    of what it gives, (rows, cells).
+    frame, constants: what it takes, which lies at `where`; `pack` puts numbers in place of the constants. tables: what
+    the frame points to. out: the part that counts of what it gives, (rows, cells).
     """
 
     reads: tuple[Read, ...]
+    pack: Callable[..., None]
     constants: Array
     out: Array
     frame: Ints
@@ -53,7 +55,7 @@ class _Layout(Struct):
 
     def run(self, function: Loaded, env: Mapping[str, Cell]) -> list[list[float]]:
         """Row by row what the function gives for each of the cells."""
-        self.constants[:] = [env[name].v if d < 0 else env[name].t[d] for name, d in self.reads]
+        self.pack(self.constants, 0, *[env[name].v if d < 0 else env[name].t[d] for name, d in self.reads])
         function.call(*self.where)
         return self.out.tolist()  # type: ignore[no-any-return]
 
@@ -68,6 +70,17 @@ class RegionPart(Struct, frozen=True):
     nodes: int
     idle: list[_Layout] = []
 
+    @property
+    def reads(self) -> tuple[Read, ...]:
+        """The numbers that its function is told, one after the other."""
+        places = [place for place in self.way.places if place.kind == "number"]
+        return tuple((place.name, -1 if place.part.kind == "v" else place.part.direction) for place in places)
+
+    @property
+    def share(self) -> float:
+        """How many times more rounding may be than at the nodes where it is followed."""
+        return ELSEWHERE if self.nodes > TRACKED else 1.0
+
     def layout(self) -> _Layout:
         count = len(self.cells)
         lanes = np.minimum(np.arange(max(count, LANES)), count - 1)
@@ -76,14 +89,10 @@ class RegionPart(Struct, frozen=True):
         nobody = np.zeros(lanes.size, dtype=np.int64)  # no parameter differs from cell to cell
         out = np.empty((self.way.rows(self.k1), lanes.size))
         frame = frame_of(out, self.axes, [nobody, *ends])
-        reads = tuple(
-            (place.name, -1 if place.part.kind == "v" else place.part.direction)
-            for place in self.way.places
-            if place.kind == "number"
-        )
-        constants = np.empty(len(reads))
+        constants = np.empty(len(self.reads))
         where = address(frame), address(constants)
-        return _Layout(reads, constants, out[:, :count], frame, [nobody, *ends], where)
+        pack = struct.Struct(f"{len(self.reads)}d").pack_into
+        return _Layout(self.reads, pack, constants, out[:, :count], frame, [nobody, *ends], where)
 
     def summed(self, function: Loaded, env: Mapping[str, Cell]) -> MovingTotals | None:
         """The sums over all nodes of the cells; None where cuts cross."""
@@ -95,7 +104,7 @@ class RegionPart(Struct, frozen=True):
         self.idle.append(layout)
         if not min(rows[3 * self.k1]) > 0:
             return None
-        k1, share = self.k1, ELSEWHERE if self.nodes > TRACKED else 1.0
+        k1, share = self.k1, self.share
         number, error, gross = [], [], []
         for d in range(k1):
             own = rows[d]

@@ -1,0 +1,165 @@
+"""An integral all about which is settled in a region of its parameters, as one straight function of Python.
+
+Owns `SettledRegion`, and `accurate`. Which parameters are read, where they lie, what the function of machine code is
+told, how many cells there are and how many tangents, is the same at every call: where there is machine code, what is
+left around it is written out once, as a text with these numbers in it. To go through lists of them takes as long again
+as the nodes do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import nullcontext
+from functools import lru_cache
+from types import CodeType
+from typing import Any
+
+import numpy as np
+from msgspec import Struct
+
+from potto.integrate.fixed.alone import LEFT, RegionPart
+from potto.integrate.fixed.moving_sums import MovingTotals, evaluated, summed
+from potto.integrate.fixed.straight import StraightIntegral
+from potto.integrate.pieces import Evaluator
+from potto.integrate.rules.gauss import EPS
+from potto.integrate.rules.proved_orders import Region
+from potto.kernels.making import counts
+from potto.kernels.native.objects import Loaded
+from potto.kernels.native.promotion import Promotion
+
+# How far off a rule may be for a sum that cancels, as a part of what it is when nothing does.
+NOISE = 1e-12
+# Up to how many cells their numbers have names of their own.
+FEW = 4
+Box = Sequence[tuple[str, float, float]]
+Faces = Sequence[tuple[RegionPart, Loaded]]
+At = Callable[[dict[str, Any]], MovingTotals | None]
+
+
+class SettledRegion(Struct, frozen=True, eq=False):
+    """An integral all over a region of its parameters, which run along tangents that stay the same.
+
+    box: per parameter, between which numbers. truncation: a bound of what the rule leaves out, of the value and each
+    tangent. straight: the function of machine code with what is around it; None where numpy adds up: for good, or until
+    the function that it stands in for, which is `awaited`, is due.
+    """
+
+    plan: StraightIntegral
+    region: Region
+    machine: Evaluator
+    box: tuple[tuple[str, float, float], ...]
+    truncation: list[float]
+    straight: At | None
+    awaited: Promotion | None
+
+    @classmethod
+    def of(
+        cls, plan: StraightIntegral, region: Region, machine: Evaluator, box: Mapping[str, tuple[float, float]],
+        truncation: list[float], faces: Faces | None, awaited: Promotion | None,
+    ) -> SettledRegion:  # fmt: skip
+        """faces: integrands with their functions of machine code; none where numpy adds up."""
+        places = tuple((name, low, high) for name, (low, high) in box.items())
+        straight = by_machine_code(places, faces, truncation, machine.rtol, machine.atol) if faces else None
+        return cls(plan, region, machine, places, truncation, straight, awaited)
+
+    def at(self, env: dict[str, Any]) -> MovingTotals | None:
+        """The value and its tangents; None outside of the region, and where they are not accurate enough."""
+        if self.straight is not None:
+            return self.straight(env)
+        for name, low, high in self.box:
+            if not low <= env[name].v <= high:
+                return None
+        if self.awaited is not None and self.awaited.due:
+            return None
+        plan, machine = self.plan, self.machine
+        with np.errstate(all="ignore"), nullcontext() if self.awaited is None else self.awaited.by_numpy():
+            frame = evaluated(plan.frames[0], machine.tracking(), env)
+            found = summed(plan.variables, plan.frames, self.region, machine, env, frame)
+        return None if found is None else accurate(found, self.truncation, machine.rtol, machine.atol)
+
+
+def accurate(found: MovingTotals, truncation: Sequence[float], rtol: float, atol: float) -> MovingTotals | None:
+    """The answer, if it is as accurate as was asked for, or as its rounding allows."""
+    errors, unit, least, part = [], EPS * max(found.gross), 0.5 * atol, 0.5 * rtol
+    for x, rounding, gross, beyond in zip(found.number, found.error, found.gross, truncation, strict=True):
+        asked = part * abs(x)
+        if asked < least:
+            asked = least
+        if not rounding <= asked or not (beyond <= asked or beyond <= NOISE * gross or beyond <= unit):
+            return None
+        errors.append(rounding + beyond)
+    return MovingTotals(found.number, errors, found.gross, found.nodes)
+
+
+def by_machine_code(box: Box, faces: Faces, truncation: Sequence[float], rtol: float, atol: float) -> At:
+    """What `SettledRegion.at` is where machine code adds up, and `accurate` says whether that is enough."""
+    k1, nodes = len(truncation), sum(part.nodes for part, _ in faces)
+    scope: dict[str, Any] = {
+        "MovingTotals": MovingTotals, "counts": counts, "half": 0.5 * rtol, "least": 0.5 * atol, "left": LEFT,
+        **{f"beyond{d}": bound for d, bound in enumerate(truncation)},
+    }  # fmt: skip
+    lines = []
+    for i, (name, low, high) in enumerate(box):
+        scope |= {f"low{i}": low, f"high{i}": high}
+        lines.append(f"if not low{i} <= env[{name!r}].v <= high{i}: return None")
+    for i, (part, function) in enumerate(faces):
+        scope |= {f"idle{i}": part.idle, f"layout{i}": part.layout, f"call{i}": function.call, f"share{i}": part.share}
+        lines += _of_face(part, i, k1)
+    lines.append(f"counts.native_points += {nodes}")
+    every = range(k1)
+    for d in every:
+        lines += [
+            f"asked = half*abs(n{d})",
+            "if asked < least: asked = least",
+            f"if not e{d} <= asked or not (beyond{d} <= asked or beyond{d} <= {NOISE!r}*g{d} or "
+            f"beyond{d} <= {EPS!r}*{_largest([f'g{c}' for c in every])}): return None",
+        ]
+    numbers, errors, gross = (", ".join(row) for row in zip(*((f"n{d}", f"e{d} + beyond{d}", f"g{d}") for d in every),
+                                                            strict=True))  # fmt: skip
+    lines.append(f"return MovingTotals([{numbers}], [{errors}], [{gross}], {nodes})")
+    exec(_compiled("def at(env):\n    " + "\n    ".join(lines) + "\n"), scope)
+    return scope["at"]  # type: ignore[no-any-return]
+
+
+@lru_cache(maxsize=512)
+def _compiled(text: str) -> CodeType:
+    return compile(text, "<settled>", "exec")
+
+
+def _of_face(part: RegionPart, i: int, k1: int) -> list[str]:
+    """The lines for an integrand, which add to the numbers n0 ..., their errors e0 ... and their sizes g0 ..."""
+    count, add = len(part.cells), "+=" if i else "="
+    numbers = ", ".join(f"env[{n!r}].v" if d < 0 else f"env[{n!r}].t[{d}]" for n, d in part.reads)
+    rows = [[f"r{row}_{cell}" for cell in range(count)] if count <= FEW else [f"r{row}"] for row in range(3 * k1 + 1)]
+    targets = ", ".join(f"({''.join(f'{x}, ' for x in row)})" if count <= FEW else row[0] for row in rows)
+    lines = [
+        f"try: layout = idle{i}.pop()",
+        f"except IndexError: layout = layout{i}()",
+        f"layout.pack(layout.constants, 0, {numbers})" if numbers else "pass",
+        f"call{i}(*layout.where)",
+        f"{targets}, = layout.out.tolist()",
+        f"idle{i}.append(layout)",
+        f"if not ({' and '.join(f'{x} > 0' for x in rows[-1])}): return None"
+        if count <= FEW
+        else f"if not min({rows[-1][0]}) > 0: return None",
+    ]
+    for d in range(k1):
+        own, most, off = (rows[part * k1 + d] for part in range(3))
+        sizes = " + ".join(f"abs({x})" for x in own) if count <= FEW else f"sum(map(abs, {own[0]}))"
+        lines += [
+            f"most = {_total(most, count)}",
+            f"size = {sizes}",
+            "if size > most: most = size",
+            f"n{d} {add} {_total(own, count)}",
+            f"e{d} {add} share{i}*({_total(off, count)}) + left*most",
+            f"g{d} {add} most",
+        ]
+    return lines
+
+
+def _total(row: Sequence[str], count: int) -> str:
+    return " + ".join(row) if count <= FEW else f"sum({row[0]})"
+
+
+def _largest(names: Sequence[str]) -> str:
+    return names[0] if len(names) == 1 else f"max({', '.join(names)})"
