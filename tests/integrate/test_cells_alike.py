@@ -257,3 +257,32 @@ def test_lines_between_samples_are_cells_alike() -> None:
     assert abs(found.value - 1 / 120) <= found.error < 0.1 / 120
     assert abs(found.tangent - 1 / 24) <= found.tangent_error < 0.1 / 24
     assert found.evals <= 2 * 4096
+
+
+@pytest.mark.parametrize("backend", ["numpy", "native"])
+def test_lines_along_an_axis_are_cut_like_others(backend: Any) -> None:
+    """Half of them are level or upright, and meet the other variable nowhere: they are not gone over one by one."""
+    if backend == "native":
+        pytest.importorskip("llvmlite")
+    random = np.random.default_rng(0)
+    a, b = random.uniform(0.1, 0.9, (2, 400))
+    a[::2] = b[::2]
+    da, db = random.normal(size=(2, 400))
+    level = potto.compile("def f(a, b) integral ([0, 1], [0, 1]) [y < a + (b - a)*x] d(x, y)").f
+    upright = potto.compile("def f(a, b) integral ([0, 1], [0, 1]) [x < a + (b - a)*y] d(x, y)").f
+    with potto.settings(backend=backend):
+        for f in (level, upright):
+            answer = potto.deriv(f)((a, da), (b, db))
+            covered(answer, (a + b) / 2, (da + db) / 2)
+            assert answer.evals <= 2 * a.size  # one for each cell: an area
+
+
+def test_a_quadratic_that_is_a_line_has_its_one_root() -> None:
+    """The other one is at infinity. By 50 digits, where a is not 0."""
+    a = np.concatenate([np.zeros(100), np.linspace(0.1, 0.8, 100)])
+    c = np.tile(np.linspace(0.1, 0.9, 100), 2)
+    answer = answered("def f(c, a) integral [0, 1] [a*x^2 + x > c] d(x)", c, a=a)
+    with mp.workdps(50):
+        root = [(2 * y / (1 + mp.sqrt(1 + 4 * x * y))) for x, y in zip(map(mp.mpf, a), map(mp.mpf, c), strict=True)]
+        slope = [-1 / mp.sqrt(1 + 4 * x * y) for x, y in zip(map(mp.mpf, a), map(mp.mpf, c), strict=True)]
+    covered(answer, np.array([float(1 - r) for r in root]), np.array([float(s) for s in slope]), 1e-12)

@@ -1,8 +1,8 @@
 """The cells of many members that machine code finds are those that numpy finds.
 
 Both compare, subtract and bound the rounding of the same doubles, so that they agree about every cell and about who is
-plain; cuts repeat, lie on bounds, or are no numbers (roots that are not there). Where one may be anywhere nothing is
-sure.
+plain; cuts repeat, lie on bounds, were divided by 0, or are no numbers (roots that are not there). Where one may be
+anywhere nothing is sure.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import potto
 from potto.integrate.fixed import topologies as module
 from potto.integrate.fixed.lowered_topologies import Found, LoweredTopologies
 from potto.integrate.fixed.topologies import in_order
+from potto.kernels.cells import Cell
 
 pytest.importorskip("llvmlite")
 
@@ -22,6 +23,7 @@ PROGRAMS = {
     "lines": "def f(a, b, c) integral ([0, 1], [0, 1]) [x + y > a] + [x - 2*y > b]*[x > c] d(x, y)",
     "a circle": "def f(a, b, c) integral ([a, 1], [b, 1]) [x^2 + y^2 < c^2 + 0.25] d(x, y)",
     "moving bounds": "def f(a, b, c) integral ([a, b + 2], [0, c + 2]) x*[y > x*a] d(x, y)",
+    "coefficients": "def f(a, b, c) integral ([0, 1], [0, 1]) [(a - b)*x + y > c] + [x > (c - a)*y] d(x, y)",
     "three variables": "def f(a, b, c) integral ([0, 1], [0, 1], [0, 1]) [x + y + z > a]*[x > b] d(x, y, z)",
 }
 
@@ -80,3 +82,12 @@ def test_what_may_be_anywhere_has_no_order() -> None:
     for member in np.flatnonzero(fine):
         own = order[: count[member], member]
         assert (np.diff(places[own, member]) > 0).all() and {own[0], own[-1]} == {0, 1}
+
+
+@pytest.mark.parametrize("low", [0.0, -1.0])
+def test_what_was_divided_by_0_is_nowhere_on_one_side_of_0(low: float) -> None:
+    """On both sides the surface may be clear of its rounding at 0 and have a root beside it."""
+    root = Cell(np.array([np.inf, 0.5]), np.array([np.nan, 1e-16]))
+    places, off = module._rows((Cell(np.full(2, low)), Cell(np.ones(2)), root), 2)
+    assert (np.isnan(places[2, 0]), np.isinf(off[2, 0])) == ((True, False) if low == 0 else (False, True))
+    assert in_order(places, off)[2].tolist() == [low == 0, True]

@@ -174,11 +174,20 @@ def _spread(value: Value, batch: int, moving: bool) -> Value:
 
 
 def _rows(values: tuple[Cell, ...], count: int) -> tuple[Array, Array]:
-    """The places of bounds and cuts, and how far they may be off, (R, M) each."""
+    """The places of bounds and cuts, and how far they may be off, (R, M) each.
+
+    What was divided by a difference that is 0 is at infinity, with nan for what it may be off. That is no root, if the
+    surface is clear of its rounding in the middle of each cell: one that a divisor of the size of its rounding has in a
+    cell leaves no more there than that size times the farther end, on one side of 0 at most twice the middle.
+    """
     places, off = np.empty((2, len(values), count))
     for row, cell in enumerate(values):
         places[row], off[row] = cell.v, 0.0 if cell.e is None else cell.e
-    off[np.isnan(off) & ~np.isnan(places)] = np.inf  # roots that merge just here: they are there, and nothing is known
+    unknown = np.isnan(off)
+    if unknown.any():
+        one_sided = (places[:2] >= 0).all(axis=0) | (places[:2] <= 0).all(axis=0)
+        places[unknown & np.isinf(places) & one_sided] = np.nan
+        off[unknown & ~np.isnan(places)] = np.inf  # roots that merge just here: they are there, and nothing is known
     return places, off
 
 

@@ -70,7 +70,7 @@ class TopologyText(FormulaText):
             self.tell(env, there, between)
             return
         cells = self.evaluated(self.plan.frames[i], env, self.machine)
-        ordered = self.ordered([cell.v for cell in cells], [self.near(cell) for cell in cells])
+        ordered = self.ordered(self.placed(cells), list(map(self.near, cells)))
         self.only(there, ordered.fine)
         rows, places = at.room(len(cells)), at.room(len(cells))
         for rank, (row, place, _) in enumerate(ordered.rows):
@@ -88,6 +88,21 @@ class TopologyText(FormulaText):
         self.over(i + 1, {**env, self.plan.variables[i]: Symbol(middle, None, (), ())}, own, between)
         at.end()
         at.end()
+
+    def placed(self, cells: Sequence[Symbol]) -> list[str]:
+        """Where rows are; nowhere, if they were divided by 0 and that tells that they are no roots (`topologies`)."""
+        at, ends = self.at, [cell.v for cell in cells[:2]]
+        above, below = (at.apply("and", *(at.apply(way, end, self.zero) for end in ends)) for way in ("ge", "le"))
+        one_sided, places = at.apply("or", above, below), ends
+        for cell in cells[2:]:
+            place = cell.v
+            if cell.e is not None:
+                infinite = at.apply("eq", at.apply("abs", place), at.number(np.inf))
+                unknown = at.apply("not", at.apply("eq", cell.e, cell.e))
+                nowhere = at.apply("and", one_sided, at.apply("and", infinite, unknown))
+                place = at.apply("select", nowhere, at.number(np.nan), place)
+            places.append(place)
+        return places
 
     def near(self, cell: Symbol) -> str:
         """From where on a place is as good as another: where roots merge just here that is not known."""
