@@ -13,9 +13,14 @@ from potto.core.terms import add, mul, prim, sub, var
 from potto.syntax import parse_expression
 
 PROGRAMS = [
-    ("def f(s, t) integral (x ~ normal(0, s)) [x < t] d(x)", ("0 < s",)),
-    ("def f(a, t) 2*integral (x ~ uniform(0, a)) [x < t]*x d(x)", ("0 < a",)),
-    ("def f(r, t) integral (x ~ exponential(r)) exp(-t*x) d(x)", ("0 < r",)),
+    ("def f(s, t) integral (x ~ normal(0, s)) [x < t] d(x)", ("s > 0",)),
+    ("def f(a, t) 2*integral (x ~ uniform(0, a)) [x < t]*x d(x)", ("a > 0",)),
+    ("def f(r, t) integral (x ~ exponential(r)) exp(-t*x) d(x)", ("r > 0",)),
+    (
+        "record Noise(mean: Real, width: Real)\n"
+        "def f(n: Noise, t) integral (x ~ uniform(-n.width, n.width)) [x + n.mean < t] d(x)",
+        ("n.width > 0",),
+    ),
     ("def f(a, m, b) integral (x ~ triangular(a, m, b)) x d(x)", ("a <= m and m <= b", "a < b")),
     ("def f(n, t) integral [0, 1] (sum k in 1..n ([x < t/k] + k*t)) * (sum k in 1..n (k*t*x)) d(x)", ()),
     ("def f(n, t) sum k in 1..n (integral [0, 1] [x < t/k] d(x))", ()),
@@ -37,6 +42,17 @@ def test_formulas_are_potto(program: str, where: tuple[str, ...]) -> None:
         assert "?" not in text and "'" not in text
         assert not parse_expression(text).diagnostics, text
     assert all(f"has a value where {condition}" in shown.notes for condition in where)
+
+
+def test_an_index_is_named_as_the_formula_has_it() -> None:
+    library = Library()
+    file = library.put("<text>", "def g(t) [integral [0, i + 1] [x < t] d(x) for i in 0..3]\n"
+                                 "def f(t) sum i in 0..3 (i*g(t)[i])\n")  # fmt: skip
+    facts = derivative_facts(library.db, file, "f")
+    assert facts is not None
+    (part,) = facts.integrals
+    assert part.each == "i in 0..3"
+    assert part.value == "integral [0, i + 1] [x < t] d(x)"
 
 
 DECIDED = [
@@ -124,6 +140,17 @@ def test_what_both_sides_of_a_choice_share_stands_before_it() -> None:
     file = library.put("<text>", "def f(t, s) integral [0, 1] (if [x < 1/2] then x*exp(-t*x) else 3*exp(-t*x)) d(x)\n")
     shown = explain_derivative(library.db, file, "f").tangent
     assert shown == "-(integral [0, 1] x*exp(-t*x)*(if [x < 0.5] then x else 3)*dt d(x))"
+
+
+def test_what_all_summands_are_multiples_of_is_cancelled() -> None:
+    """The share of a normal distribution between a and b moves by its densities there."""
+    library = Library()
+    file = library.put("<text>", "def f(a, b, m, s) (erf((b - m)/(s*sqrt(2))) - erf((a - m)/(s*sqrt(2))))/2\n")
+    shown = explain_derivative(library.db, file, "f").tangent
+    assert shown == (
+        "exp(-(b - m)^2/(2*s^2))*(s*db + (m - b)*ds - s*dm)/(s^2*sqrt(2*pi))"
+        " + exp(-(a - m)^2/(2*s^2))*((a - m)*ds + s*dm - s*da)/(s^2*sqrt(2*pi))"
+    )
 
 
 def test_a_choice_by_a_sign_is_a_function_of_the_size() -> None:

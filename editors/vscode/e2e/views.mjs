@@ -62,6 +62,7 @@ export const VIEWS = {
       return times;
     });
     await frame.locator("#now figcaption", { hasText: "t = 0.55" }).waitFor();
+    await frame.locator("#time").filter({ hasNotText: "numbers follow" }).waitFor();
     const after = await numbers(frame);
     assert.notEqual(await picture(frame), drawn);
     assert.notDeepEqual(after.slice(0, 2), before.slice(0, 2));

@@ -7,18 +7,17 @@ says what is wrong; a person reads the formula and beside it, once, where it hol
 from __future__ import annotations
 
 from potto.calculus.algebra.ranges import range_of
-from potto.core.printer import format_term
 from potto.core.terms import Hole, If, Prim, Term, sub, transform
 
 
-def unguarded(term: Term) -> tuple[Term, tuple[str, ...]]:
-    """The term without the guards of its measures, and their conditions as Potto writes them, each once."""
-    conditions: dict[str, None] = {}
+def unguarded(term: Term) -> tuple[Term, tuple[Term, ...]]:
+    """The term without the guards of its measures, and their conditions, each once."""
+    conditions: dict[Term, None] = {}
 
     def change(node: Term, new: Term) -> Term:
         if isinstance(node, If) and isinstance(new, If) and isinstance(node.orelse, Hole) and node.orelse.measure:
             if not _always(node.condition):
-                conditions[format_term(node.condition)] = None
+                conditions[node.condition] = None
             return new.then
         return new
 

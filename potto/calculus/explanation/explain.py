@@ -23,7 +23,7 @@ from potto.calculus.explanation.continuity import continuous
 from potto.calculus.explanation.decimals import in_decimals
 from potto.calculus.explanation.fields import fields_of
 from potto.calculus.explanation.layout import DerivativeText, IntegralText, SurfaceText
-from potto.calculus.explanation.plain_names import plainly_named
+from potto.calculus.explanation.plain_names import Each, plainly_indexed, plainly_named
 from potto.calculus.explanation.readable import ReadableParts, readable
 from potto.calculus.explanation.symbols import NoFormula, Rewrite, Words, over_functions
 from potto.calculus.inlining.expand import Resolve, heads_of
@@ -60,8 +60,6 @@ from potto.diagnostics import PottoError
 from potto.elaborate import core_term
 from potto.query import Database
 from potto.types import Type, derivative_type, format_type, groups_of, interface
-
-Each = tuple[str, Term, Term]  # an index, from, to
 
 
 def explain_derivative(db: Database, file: str, name: str) -> DerivativeText:
@@ -158,7 +156,8 @@ def describe(
     integrals = tuple(
         _integral(unnested(i), each, work, tangents, words) for i, each in known if isinstance(i, Integral)
     )
-    found = DerivativeText(name, type_text, tangent, isinstance(body, Integral), integrals, conditions)
+    where = tuple(dict.fromkeys(map(words.condition, conditions)))
+    found = DerivativeText(name, type_text, tangent, isinstance(body, Integral), integrals, where)
     found = replace(found, problems=tuple(problems), smooth=tangent, parameters=tuple(params))
     if not integrals and not problems:
         plain = work.carried_out(body)
@@ -222,7 +221,7 @@ def _integral(
     def rate(term: Term) -> Term:
         return work.dual(term, inside)[1]
 
-    node = plainly_named(node, words.names)
+    node, around = plainly_indexed(plainly_named(node, words.names), around, words.names)
     inside = {n: t for n, t in tangents.items() if n not in node.variables}
     indices = [name for name, _, _ in around]
     names, ranges = (*node.variables, *indices), _ranges(around)

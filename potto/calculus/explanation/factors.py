@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from fractions import Fraction
+from math import gcd
 
 from msgspec import Struct
 
@@ -28,6 +29,7 @@ from potto.core.terms import (
     Term,
     Var,
     add,
+    children,
     const,
     div,
     mul,
@@ -92,6 +94,9 @@ def _collect(term: Term, exponent: Exact, into: Factors) -> None:
         case Prim(op="add", args=args) if exponent.denominator == 1 and all(map(_negative, args)):
             into.coefficient *= Fraction(-1) ** int(exponent)
             into.times(add(*map(neg, args)), exponent)
+        case Prim(op="add", args=args) if exponent.denominator == 1 and (shared := gcd(*map(_whole, args))) > 1:
+            into.coefficient *= Fraction(shared) ** int(exponent)
+            into.times(add(*(_without(arg, shared) for arg in args)), exponent)
         case Prim(op="add") if exponent.denominator == 1 and (found := _cosine(term)) is not None:
             into.coefficient *= Fraction(found[1]) ** int(exponent)
             into.times(found[0], 2 * exponent)
@@ -107,6 +112,35 @@ def _collect(term: Term, exponent: Exact, into: Factors) -> None:
 
 def _negative(term: Term) -> bool:
     return (isinstance(term, Prim) and term.op == "neg") or (isinstance(term, Const) and term.value < 0)
+
+
+def _whole(term: Term) -> int:
+    """The whole number that a term is a multiple of as it is written."""
+    match term:
+        case Const(name=None, value=value) if value.is_integer():
+            return abs(int(value))
+        case Prim(op="neg" | "div", args=(inner, *_)):
+            return _whole(inner)
+        case Prim(op="mul", args=args):
+            return max(map(_whole, args))
+        case _:
+            return 1
+
+
+def _without(term: Term, number: int) -> Term:
+    """A multiple of a whole number divided by it."""
+    match term:
+        case Const(value=value):
+            return const(value / number)
+        case Prim(op="neg", args=(inner,)):
+            return neg(_without(inner, number))
+        case Prim(op="div", args=(top, below)):
+            return div(_without(top, number), below)
+        case _:
+            parts = list(children(term))
+            place = max(range(len(parts)), key=lambda n: _whole(parts[n]))
+            parts[place] = _without(parts[place], number)
+            return mul(*parts)
 
 
 def _cosine(term: Prim) -> tuple[Term, int] | None:

@@ -1,13 +1,15 @@
 """Integrals over variables that a program can write.
 
-Owns `plainly_named` and `apart`.
+Owns `plainly_named`, `plainly_indexed` and `apart`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable
+from collections.abc import Container, Iterable, Mapping
 
-from potto.core.terms import Integral, integral, substitute, var
+from potto.core.terms import Integral, Term, Var, integral, substitute, var
+
+Each = tuple[str, Term, Term]  # an index, from, to
 
 
 def plainly_named(node: Integral, params: Iterable[str]) -> Integral:
@@ -24,6 +26,26 @@ def plainly_named(node: Integral, params: Iterable[str]) -> Integral:
     bounds = tuple((substitute(low, terms), substitute(high, terms)) for low, high in node.bounds)
     found = integral(tuple(new.values()), bounds, substitute(node.body, terms))
     return found if isinstance(found, Integral) else node
+
+
+def plainly_indexed(node: Integral, around: Iterable[Each], params: Iterable[str]) -> tuple[Integral, tuple[Each, ...]]:
+    """An integral and the indices of what it stands in, by names that a program can write."""
+    around = tuple(around)
+    taken = {*params, *node.variables, *(name for name in node.free if "'" not in name)}
+    new: dict[str, Term] = {}
+    for name, _, _ in around:
+        if "'" in name:
+            plain = apart(name.partition("'")[0], taken)
+            taken.add(plain)
+            new[name] = var(plain)
+    found = substitute(node, new)
+    assert isinstance(found, Integral), "names alone are others"
+    return found, tuple([(_name(new, name), substitute(lo, new), substitute(hi, new)) for name, lo, hi in around])
+
+
+def _name(new: Mapping[str, Term], name: str) -> str:
+    found = new.get(name)
+    return found.name if isinstance(found, Var) else name
 
 
 def apart(name: str, taken: Container[str]) -> str:

@@ -41,6 +41,7 @@ from potto.core.terms import (
     postorder,
     proj,
     rebuild,
+    sub,
     transform,
     var,
 )
@@ -66,6 +67,15 @@ class Words(Struct, frozen=True):
     def plain(self, term: Term) -> str:
         """A term as it is written, parts of records by their names."""
         return format_term(simplify(in_decimals(self.fields(term))))
+
+    def condition(self, term: Term) -> str:
+        """A comparison as people write it: `s > 0` for -s < s."""
+        match term:
+            case Prim(op="lt", args=(left, right)):
+                bracket = branch((simplify(self.fields(sub(right, left))),), True, ONE, ZERO)
+                return format_term(readable(bracket, frozenset()))[1:-1]
+            case _:
+                return self.plain(term)
 
     def text(self, term: Term, *inside: str, box: Box | None = None) -> str:
         """A formula that is Potto, in the parameters, their tangents and the variables it is `inside` of. Raises
