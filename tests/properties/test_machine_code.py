@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import random
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -26,7 +27,7 @@ from potto.runtime.evaluate import Program
 
 pytest.importorskip("llvmlite")
 
-COUNT = 1_500  # numpy does fewer than 1,024 points by itself, whatever is asked for
+COUNT = 1_500  # numpy does fewer than 256 points by itself, whatever is asked for
 NAMES = ("x", "y", "t")
 
 
@@ -105,6 +106,48 @@ def test_arithmetic_is_the_same_to_the_last_bit(seed: int) -> None:
         assert (ours is None) == (theirs is None)
         if ours is not None:
             np.testing.assert_array_equal(*np.broadcast_arrays(ours, theirs))
+
+
+@pytest.mark.parametrize("kind", ["plain", "not to be written to", "every second", "turned", "empty", "column and row"])
+def test_arrays_lie_in_memory_as_they_like(kind: str) -> None:
+    def placed(numbers: Any) -> Any:
+        if kind == "not to be written to":
+            numbers.flags.writeable = False
+        return {"every second": numbers[..., ::2], "turned": numbers.T[::-1], "empty": numbers[:0]}.get(kind, numbers)
+
+    generator = np.random.default_rng(3)
+    shapes = ((300, 1), (1, 400)) if kind == "column and row" else ((40, 50), (40, 50))
+    x, y = (placed(generator.random(shape)) for shape in shapes)
+    a, b = core.var("x"), core.var("y")
+    whole = core.add(core.div(a, core.add(b, core.const(1.0))), core.mul(a, b))
+    env: dict[str, Value] = {"x": Cell(x, None, (1.0,)), "y": Cell(y, None, (None,))}
+    value, _, tangent, _ = outcome(whole, env, "native", False)
+    np.testing.assert_array_equal(value, np.broadcast_to(x / (y + 1.0) + x * y, np.shape(value)))
+    np.testing.assert_allclose(
+        tangent, np.broadcast_to(1 / (y + 1.0) + y, np.shape(value)), rtol=1e-15
+    )  # one rounding each
+
+
+@pytest.mark.parametrize("op", ["add", "mul"])
+@pytest.mark.parametrize("count", [2, 3])
+def test_tangents_that_cancel_keep_what_they_round_off(op: str, count: int) -> None:
+    """Tangents of 1e8 with a sum of about 1: what their products and sums round off is 1e8 times as much as that of
+    the result. Held against rational numbers, and against numpy to the last bit."""
+    generator = np.random.default_rng(7)
+    values, tangents = generator.uniform(0.5, 1.5, (2, count, COUNT))
+    tangents[0] *= 1e8
+    rest = values[1] / values[0] if op == "mul" else 1.0
+    tangents[1] = -tangents[0] * rest + generator.uniform(-1, 1, COUNT)
+    env: dict[str, Value] = {name: Cell(v, None, (t,)) for name, v, t in zip(NAMES, values, tangents, strict=False)}
+    whole = core.prim(op, *map(core.var, NAMES[:count]))
+    native, numpy = (outcome(whole, env, backend, True) for backend in ("native", "numpy"))
+    for ours, theirs in zip(native, numpy, strict=True):
+        np.testing.assert_array_equal(ours, theirs)
+    for v, t, found, error in zip(values.T.tolist(), tangents.T.tolist(), native[2], native[3], strict=True):
+        parts = [Fraction(x) for x in t]
+        if op == "mul":
+            parts = [x * math.prod(Fraction(y) for j, y in enumerate(v) if j != i) for i, x in enumerate(parts)]
+        assert abs(Fraction(float(found)) - sum(parts)) <= Fraction(float(error))
 
 
 OURS = ("exp", "log", "sin", "cos")

@@ -20,7 +20,7 @@ from potto.integrate.fixed.straight import StraightIntegral
 from potto.integrate.pieces import Evaluator
 from potto.integrate.rules.gauss import EPS, gauss
 from potto.integrate.rules.written_intervals import Names, WrittenInterval
-from potto.kernels.native.straight import NotStraight
+from potto.kernels.native.operations import NotStraight
 
 # How near to 0, of its size, a surface at a corner may be before it counts as crossing.
 NEAR = 1e-9

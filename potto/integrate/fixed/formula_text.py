@@ -13,7 +13,8 @@ from msgspec import Struct
 
 from potto.core.terms import Lam
 from potto.integrate.pieces import Evaluator
-from potto.kernels.native.straight import ArgumentPart, FlatKernel, NotStraight, Packed, packed
+from potto.kernels.native.operations import NotStraight
+from potto.kernels.native.straight import ArgumentPart, FlatKernel, Packed, packed
 from potto.kernels.native.vectors import LANES, Vectors
 
 ONE = "1.0"

@@ -18,7 +18,7 @@ from potto.integrate.fixed.formula_text import Env, FormulaText, ParameterPlace,
 from potto.integrate.fixed.straight import CLEAR, ROW_BITS, StraightIntegral
 from potto.integrate.pieces import Evaluator
 from potto.kernels.native.elementary import module
-from potto.kernels.native.straight import NotStraight
+from potto.kernels.native.operations import NotStraight
 from potto.kernels.native.vectors import LANES
 
 NAME = "topology"

@@ -16,7 +16,7 @@ import numpy as np
 from potto.core.terms import Branch, Const, If, Prim, Term
 from potto.integrate.rules.gauss import EPS
 from potto.integrate.rules.intervals import ANYTHING, ROUNDING, interval_of
-from potto.kernels.native.straight import FUNCTIONS, NotStraight
+from potto.kernels.native.operations import FUNCTIONS, NotStraight
 from potto.primitives import PRIMITIVES, Primitive
 from potto.primitives.walking import Domain, Rule
 

@@ -9,14 +9,13 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
 from potto.kernels.making import compiling, counts, making
 from potto.kernels.native import objects
-from potto.kernels.native.straight import NotStraight
+from potto.kernels.native.operations import NotStraight
 
 if TYPE_CHECKING:
     from concurrent.futures import Future, ThreadPoolExecutor
@@ -63,13 +62,10 @@ class Promotion:
         """Whether numpy has done it for long enough, so that the function is to be asked for."""
         return self._ready is not None or self._pays()
 
-    @contextmanager
-    def by_numpy(self) -> Iterator[None]:
-        """Count the time of the block as that of numpy: the processor's, whoever else is using it. Kernels that are
-        made in it are made once."""
-        start, made = time.thread_time(), compiling.worked
-        yield
-        self.spent += time.thread_time() - start - (compiling.worked - made)
+    def by_numpy(self) -> ByNumpy:
+        """A block whose time counts as that of numpy: the processor's, whoever else is using it. Kernels that are made
+        in it are made once."""
+        return ByNumpy(self)
 
     def _pays(self) -> bool:
         """Whether numpy has taken as long as machine code would; until its text is written, as the least would."""
@@ -99,6 +95,22 @@ class Promotion:
             self._coming = _worker(os.getpid()).submit(_made, written, self.name)
             self._text = None
         return self._coming
+
+
+class ByNumpy:
+    """A block that numpy computes in; it may be as short as a kernel, so that it is no generator."""
+
+    __slots__ = ("made", "promotion", "start")
+
+    def __init__(self, promotion: Promotion) -> None:
+        self.promotion = promotion
+
+    def __enter__(self) -> None:
+        self.start, self.made = time.thread_time(), compiling.worked
+
+    def __exit__(self, kind: object, *_: object) -> None:
+        if kind is None:
+            self.promotion.spent += time.thread_time() - self.start - (compiling.worked - self.made)
 
 
 def settle() -> None:

@@ -15,9 +15,10 @@ from potto.kernels.cells import Array, Cell, Value, all_arrays, all_cells
 from potto.kernels.making import counts
 from potto.kernels.native.elementary import module
 from potto.kernels.native.objects import Loaded
+from potto.kernels.native.operations import NotStraight
 from potto.kernels.native.points import address
 from potto.kernels.native.promotion import Promotion
-from potto.kernels.native.straight import ArgumentPart, FlatKernel, NotStraight, Packed, Result, needed, packed
+from potto.kernels.native.straight import ArgumentPart, FlatKernel, Packed, Result, needed, packed
 from potto.kernels.native.vectors import LANES, Vectors
 from potto.kernels.written import Kernel
 

@@ -9,33 +9,15 @@ lines as they are; the rest are operations on numbers and masks.
 from __future__ import annotations
 
 import ast
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from msgspec import Struct
 
-from potto.kernels.whole import TWICE, UNIT_ROUNDOFF
+from potto.kernels.native.operations import CONSTANTS, NotStraight, Operation, flattened, number_of
 from potto.kernels.written import Kernel
 
-ARITHMETIC: dict[type, str] = {ast.Add: "add", ast.Sub: "sub", ast.Mult: "mul"}
-RELATIONS: dict[type, str] = {ast.Lt: "lt", ast.LtE: "le", ast.Gt: "gt", ast.GtE: "ge", ast.Eq: "eq", ast.NotEq: "ne"}
-# Functions of numbers by what kernels call them; those of the C library are among them.
-FUNCTIONS = {
-    "divide": "div", "sqrt": "sqrt", "minimum": "min", "maximum": "max", "floor": "floor", "ceil": "ceil",
-    "logical_and": "and", "logical_or": "or", "logical_not": "not", "support_select": "select", "abs": "abs",
-    "exp": "exp", "log": "log", "log1p": "log1p", "expm1": "expm1", "sinh": "sinh", "cosh": "cosh", "tanh": "tanh",
-    "arcsinh": "asinh", "arccosh": "acosh", "arctanh": "atanh", "sin": "sin", "cos": "cos", "tan": "tan",
-    "arcsin": "asin", "arccos": "acos", "arctan": "atan", "arctan2": "atan2", "hypot": "hypot", "power": "pow",
-    "special_erf": "erf",
-}  # fmt: skip
-COMPARED = (*RELATIONS.values(), "and", "or", "not", "nan")
-CONSTANTS = ("inf", "nan", "True", "False")
 SIDE = "side"
-ZERO, HALF_ULP, A_TANGENT = repr(0.0), repr(UNIT_ROUNDOFF), repr(TWICE)
-
-
-class NotStraight(Exception):
-    """A kernel does something that has no form as operations on numbers."""
 
 
 class ArgumentPart(Struct, frozen=True):
@@ -56,23 +38,6 @@ class ArgumentPart(Struct, frozen=True):
             return f"sides[{at}]"
         part = f"args[{at}].{self.kind}{f'[{self.direction}]' if self.kind in ('t', 'et') else ''}"
         return part if self.kind == "v" else f"0.0 if {part} is None else {part}"
-
-
-class Operation(Struct, frozen=True):
-    """`name` = `code` of arguments, which are names or numbers as text."""
-
-    name: str
-    code: str
-    args: tuple[str, ...]
-
-    @property
-    def is_mask(self) -> bool:
-        return self.code in COMPARED
-
-    @property
-    def masks(self) -> tuple[str, ...]:
-        """Of its arguments, those that are masks."""
-        return self.args if self.code in ("and", "or", "not") else self.args[:1] if self.code == "select" else ()
 
 
 class Packed(Struct, frozen=True):
@@ -124,23 +89,24 @@ class StraightKernel(Struct, frozen=True):
                 known.difference_update(line.sets)
         return frozenset(known)
 
-    def prelude(
-        self, constant: frozenset[str], wanted: tuple[str, ...], arrays: tuple[str, ...]
-    ) -> Callable[..., tuple[tuple[Any, ...], list[Any]]]:
-        """A function of `rt`, the sides of a trace and arguments to the numbers that are wanted, all of them in
-        `constant`, and to the parts that are arrays."""
-        read = [f"{name} = {part.text}" for name, part in self.parts.items() if name in constant or name in arrays]
-        found = f"return ({''.join(f'{name}, ' for name in wanted)}), [{', '.join(arrays)}]"
-        module = ast.parse(f"def prelude(rt, sides, args): {'; '.join((*read, found))}")
+    def function(
+        self, constant: frozenset[str], wanted: Iterable[str], parameters: str, ending: Sequence[str],
+        scope: Mapping[str, Any],
+    ) -> Callable[..., Any]:  # fmt: skip
+        """A function of these parameters, among them `rt`, the `sides` of a trace and `args`: the lines that depend on
+        nothing but what is in `constant`, then those of `ending`, which read the names that are wanted."""
+        names = constant.union(wanted)
+        read = [f"{name} = {part.text}" for name, part in self.parts.items() if name in names]
+        module = ast.parse("\n    ".join((f"def function({parameters}):", *read, *ending)))
         body: list[ast.stmt] = module.body[0].body  # type: ignore[attr-defined]
-        body[-1:-1] = [line.node for line in self.lines if set(line.sets) <= constant]
-        scope = {**self.kernel.run.__globals__, "trace": None}
-        exec(compile(ast.fix_missing_locations(module), "<prelude>", "exec"), scope)
-        return scope["prelude"]  # type: ignore[no-any-return]
+        body[len(read) : len(read)] = [line.node for line in self.lines if set(line.sets) <= constant]
+        made = {**self.kernel.run.__globals__, **scope, "trace": None}
+        exec(compile(ast.fix_missing_locations(module), "<around>", "exec"), made)
+        return made["function"]  # type: ignore[no-any-return]
 
     def operations(self, constant: frozenset[str]) -> list[Operation]:
         """What is left to be done at each point. Raises NotStraight."""
-        return _flattened(line.node for line in self.lines if not set(line.sets) <= constant)
+        return flattened(line.node for line in self.lines if not set(line.sets) <= constant)
 
 
 class FlatKernel(Struct, frozen=True):
@@ -155,7 +121,7 @@ class FlatKernel(Struct, frozen=True):
         """The operations of a plain kernel. Raises NotStraight."""
         statements, parts, result = _read(kernel.text)
         wanted = {name for cell in packed(result) for name in cell.parts()}
-        return cls(parts, needed(_flattened(statements), wanted), result)
+        return cls(parts, needed(flattened(statements), wanted), result)
 
 
 def needed(operations: Sequence[Operation], wanted: Iterable[str]) -> list[Operation]:
@@ -290,110 +256,7 @@ def _named(node: ast.expr) -> str | None:
         return None
     if isinstance(node, ast.Name):
         return node.id
-    number = _number(node)
+    number = number_of(node)
     if number is None:
         raise NotStraight(ast.unparse(node))
     return number
-
-
-def _number(node: ast.expr) -> str | None:
-    """The text of a number, if a node is one."""
-    match node:
-        case ast.Constant(value=bool() as value):
-            return str(value)
-        case ast.Constant(value=float() | int() as value):
-            return repr(float(value))
-        case ast.UnaryOp(op=ast.USub(), operand=ast.Constant(value=float() | int() as value)):
-            return repr(-float(value))
-        case ast.Call(func=ast.Name(id="float"), args=[ast.Constant(value=value)]):
-            return repr(float(str(value)))
-    return None
-
-
-def _flattened(statements: Iterable[ast.stmt]) -> list[Operation]:
-    flat = _Operations()
-    for node in statements:
-        flat.statement(node)
-    return flat.made
-
-
-class _Operations:
-    """Statements as operations, each with a name of its own."""
-
-    def __init__(self) -> None:
-        self.made: list[Operation] = []
-
-    def statement(self, node: ast.stmt) -> None:
-        match node:
-            case ast.Assign(value=ast.Constant(value=None) | ast.IfExp(test=ast.Name(id="trace"))):
-                pass  # a mask that may be forced: this one is not
-            case ast.Assign(targets=[ast.Name(id=name)], value=value):
-                self.put(value, name)
-            case ast.If(body=[ast.Assign(targets=[ast.Tuple(elts=[ast.Name(id=mask), ast.Name(id=spoiled)])],
-                                         value=ast.Call(args=[surface, ast.Constant(value=strict)]))]):  # fmt: skip
-                place = self.put(surface)
-                self.made.append(Operation(mask, "gt" if strict else "ge", (place, ZERO)))
-                bad = self.new("nan", (place,))
-                self.made.append(Operation(spoiled, "select", (bad, "nan", ZERO)))
-            case _:
-                raise NotStraight(ast.unparse(node))
-
-    def new(self, code: str, args: tuple[str, ...], name: str = "") -> str:
-        name = name or f"n{len(self.made)}"
-        self.made.append(Operation(name, code, args))
-        return name
-
-    def put(self, node: ast.expr, name: str = "") -> str:
-        """The operations of an expression; the name of its value."""
-        number = _number(node)
-        if number is not None:
-            return self.new("is", (number,), name) if name else number
-        match node:
-            case ast.Name(id=own):
-                return self.new("is", (own,), name) if name else own
-            case ast.UnaryOp(op=ast.USub(), operand=operand):
-                return self.new("neg", (self.put(operand),), name)
-            case ast.BinOp(left=left, op=op, right=right) if type(op) in ARITHMETIC:
-                return self.new(ARITHMETIC[type(op)], (self.put(left), self.put(right)), name)
-            case ast.Compare(left=left, ops=[op], comparators=[right]) if type(op) in RELATIONS:
-                return self.new(RELATIONS[type(op)], (self.put(left), self.put(right)), name)
-            case ast.IfExp(test=ast.Compare(left=ast.Name(id=spoiled)), body=body):  # v if nothing is spoiled
-                value = self.put(body)
-                return self.new("add", (value, spoiled), name)
-            case ast.Call(func=ast.Name(id=function), args=args):
-                return self.call(function.removeprefix("f_"), tuple(map(self.put, args)), name)
-        raise NotStraight(ast.unparse(node))
-
-    def call(self, function: str, args: tuple[str, ...], name: str) -> str:
-        if function.startswith("whole_"):
-            if function == "whole_add":
-                return self.rounded_sum(*args, name=name)
-            return self.share(A_TANGENT if function == "whole_slopes" else HALF_ULP, args[0], name)
-        if function == "potto_clamp":
-            return self.new("min", (self.new("max", args[:2]), args[2]), name)
-        if function == "support_by_error":
-            return self.new("select", (self.new("ne", (args[1], ZERO)), args[0], ZERO), name)
-        if function == "sign":
-            negative = self.new("select", (self.new("lt", (args[0], ZERO)), "-1.0", args[0]))
-            return self.new("select", (self.new("gt", (args[0], ZERO)), "1.0", negative), name)
-        if function not in FUNCTIONS:
-            raise NotStraight(function)
-        return self.new(FUNCTIONS[function], args, name)
-
-    def share(self, part: str, value: str, name: str = "") -> str:
-        return self.new("mul", (part, self.new("abs", (value,))), name)
-
-    def rounded_sum(self, value: str, first: str, *rest: str, name: str) -> str:
-        """What `whole.add` says of a batch."""
-        if len(rest) == 1:
-            return self.share(HALF_ULP, value, name)
-        off, total = self.share(HALF_ULP, value), first
-        least = off
-        for arg in rest[:-1]:
-            longer = self.new("add", (total, arg))
-            part = self.new("sub", (longer, total))
-            here = self.new("sub", (arg, part))
-            there = self.new("sub", (total, self.new("sub", (longer, part))))
-            off = self.new("add", (off, self.new("abs", (self.new("add", (there, here)),))))
-            total = longer
-        return self.new("select", (self.new("lt", (off, "inf")), off, least), name)

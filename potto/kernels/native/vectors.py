@@ -11,7 +11,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Iterable, Mapping, Sequence
 
-from potto.kernels.native.straight import NotStraight, Operation
+from potto.kernels.native.operations import NotStraight, Operation
 
 LANES = 8
 NUMBER, WHOLE, MASK = (f"<{LANES} x {kind}>" for kind in ("double", "i64", "i1"))

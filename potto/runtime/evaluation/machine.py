@@ -221,12 +221,13 @@ class Machine:
             watching(function, args)
         k = self.directions
         found = self.kernel(function, tuple([pattern(a, k) for a in args]))
-        if many(args) and not self.taping:
+        backend = self.backend
+        if many(args, backend) and not self.taping:
             if found.plain:
-                return at_points(found, self, trace, args, self.backend)
+                return at_points(found, self, trace, args, backend)
             whole = None if trace or watching else self._written_in(function, args)
             if whole is not None:
-                return at_points(whole[0], self, trace, whole[1], self.backend)
+                return at_points(whole[0], self, trace, whole[1], backend)
         return found.run(self, trace, *args)
 
     def _written_in(self, function: Lam, args: list[Value]) -> tuple[Kernel, list[Value]] | None:
