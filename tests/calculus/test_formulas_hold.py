@@ -30,7 +30,6 @@ WITHOUT = {
     "sphere.po:shaded", "stylize.po:pixel", "shadows.po:softly",
 }  # fmt: skip
 OPEN = {
-    "options.po:digital_delta": "the derivative of a delta that is integrated out names it again",
     "sphere.po:silhouette": "what is left after a jump is a condition on the roots of a conic",
     "metaballs.po:moments": "`deriv` itself fails beside an array of tuples",
 }

@@ -270,6 +270,8 @@ def written_out(term: Term) -> Term:
 def _without_even(item: Inequality, top: Polynomial, below: Polynomial, box: Box) -> list[Inequality]:
     """Of a product only the factors that change its sign."""
     ((monomial, scale),) = top.items()
+    if not monomial:  # a number over what may be 0, which is no place where it is 0 itself
+        item = Inequality(item.surface, True)
     if not item.strict and not set(below) - {()} and len(monomial) == 1 and monomial[0][1] == 1:
         return [Inequality(monomial[0][0] if scale > 0 else neg(monomial[0][0]), False)]
     if len(below) != 1 or not item.strict:

@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterable, Mapping
 from msgspec.structs import replace
 
 from potto.calculus.algebra.ranges import Box, range_of
+from potto.calculus.algebra.rational_form import normal
 from potto.calculus.checking.guards import unguarded
 from potto.calculus.differentiation.boundary_terms import at_bounds, at_surfaces, jumps
 from potto.calculus.differentiation.deltas import without_deltas
@@ -181,6 +182,8 @@ def _outermost(term: Term) -> list[tuple[Integral, tuple[Each, ...]]]:
         if isinstance(node, Integral):
             found.setdefault(node, around)
             continue
+        if isinstance(node, Deriv):  # of a function of its own, whose parameters are not those of the formula
+            continue
         if isinstance(node, Sum | Array | Fold):
             lo, hi = (ZERO, sub(node.size, ONE)) if isinstance(node, Array) else (node.lo, node.hi)
             around = (*around, (node.variable, lo, hi))
@@ -197,7 +200,8 @@ def _with_deltas(
 ) -> DerivativeText:
     """A function that jumps over its parameters: its derivative is a distribution over what they are filled with."""
     try:
-        over = jumps(opened(plain), tangents, lambda t: work.dual(t, tangents)[1])
+        over = [item for item in jumps(opened(plain), tangents, lambda t: work.dual(t, tangents)[1])
+                if _is_met(item.surface)]  # fmt: skip
     except (NotSmooth, NoFormula) as problem:
         return replace(found, problems=(*found.problems, f"where it jumps has no closed form: {problem}"))
     if not over:
@@ -206,13 +210,25 @@ def _with_deltas(
         smooth = words.text(work.dual(plain, tangents)[1])  # calls carried out here too: else they count twice
         meeting = [item for item in over if continuous(item, tangents)]
         moving = [item for item in over if item.rate is not ZERO and item not in meeting]
-        deltas = tuple(words.text(item.contribution) for item in moving)
+        deltas = tuple(text for item in moving if (text := words.text(item.contribution)) != "0")
     except NoFormula as problem:
         return replace(found, tangent="", smooth="", problems=(*found.problems, str(problem)))
     found = replace(found, continuous=tuple(equation(item.surface) for item in meeting))
     first = f"({smooth})" if smooth.startswith("if ") else smooth  # an `else` would take in what is added
     parts = (smooth,) if not deltas else deltas if smooth == "0" else (first, *deltas)
-    return replace(found, tangent=" + ".join(parts), smooth=smooth, deltas=deltas)
+    return replace(found, tangent=_sum_of(parts), smooth=smooth, deltas=deltas)
+
+
+def _is_met(surface: Term) -> bool:
+    """Whether a surface can be 0: 105/s is nowhere."""
+    found = normal(surface)
+    return found is None or set(found.top) != {()}
+
+
+def _sum_of(parts: Iterable[str]) -> str:
+    """Formulas added up, those with a minus in front taken away."""
+    first, *more = parts
+    return first + "".join(f" - {part[1:]}" if part.startswith("-") else f" + {part}" for part in more)
 
 
 def _integral(
@@ -333,6 +349,8 @@ def _own_surfaces(body: Term, tangents: Mapping[str, Term]) -> tuple[SurfaceText
     """Where a body without an integral jumps."""
     found: dict[Term, SurfaceText] = {}
     for item in branches_of(opened(body), tangents):
+        if not _is_met(item.surface):
+            continue
         canonical = normalized_surface(item.surface)[0]
         moved = tuple(name for name in tangents if name in item.surface.free)
         found.setdefault(canonical, SurfaceText(equation(item.surface), moved, ()))
