@@ -29,10 +29,6 @@ WITHOUT = {
     "geometry.po:pixel", "main.po:two_tones", "main.po:by_law", "shadows.po:sharp", "sphere.po:pixel",
     "sphere.po:shaded", "stylize.po:pixel", "shadows.po:softly",
 }  # fmt: skip
-OPEN = {
-    "sphere.po:silhouette": "what is left after a jump is a condition on the roots of a conic",
-    "metaballs.po:moments": "`deriv` itself fails beside an array of tuples",
-}
 WIDE = {
     "newsvendor.po:cost",
     "options.po:call",
@@ -65,8 +61,6 @@ def test_examples(path: str, name: str) -> None:
         assert not shown.text.tangent and shown.text.problems
         return
     assert shown.text.tangent, shown.text.notes
-    if where in OPEN:
-        pytest.xfail(OPEN[where])
     assert shown.problems() == [], shown.text.tangent
     if where in WIDE:
         return
