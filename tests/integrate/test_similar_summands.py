@@ -104,3 +104,48 @@ def test_a_sum_that_cancels_is_as_accurate_as_its_value() -> None:
 
     exact = 0.7 + math.fsum(s * wave(k / 200, 0.7).real for k, s in zip(ks, signs))
     assert abs(answer.value - exact) <= answer.error + 1e-13 and answer.converged
+
+
+def test_a_function_that_is_given_is_one_for_all_summands() -> None:
+    """`[x < a]*f(a, x)` with parameters of their own: all share the kernels of one, also for the next function."""
+    names = [f"a{k}" for k in range(N)]
+    body = " + ".join(f"[x < {name}]*f({name}, x)" for name in names)
+    m = potto.compile(f"""def g({", ".join(names)}, f) integral [0, 1] ({body}) d(x)
+plus = \\(a, x) . a + x
+times = \\(a, x) . a*x
+def slanted(c) \\(a, x) . a + c*x
+""")
+    at = [0.9 * (k + 1) / N for k in range(N)]
+    for f, value, slope in (  # of each summand, with its value of a
+        (m.plus, lambda a: 1.5 * a**2, lambda a: 3 * a),
+        (m.times, lambda a: a**3 / 2, lambda a: 1.5 * a**2),
+        (m.slanted(3.0), lambda a: 2.5 * a**2, lambda a: 5 * a),
+    ):
+        with potto.settings(backend="numpy"):
+            answer = potto.grad(m.g, names)(*at, f)
+        whole, exact = math.fsum(map(value, at)), np.array(list(map(slope, at)))
+        assert abs(answer.value - whole) <= answer.error + ROUNDING * whole and answer.converged
+        assert np.all(np.abs(np.array(answer.tangent) - exact) <= np.array(answer.tangent_error) + ROUNDING)
+        assert answer.stats["kernels compiled"] < N // 2
+
+
+def test_a_function_that_moves_moves_all_summands() -> None:
+    names = [f"a{k}" for k in range(N)]
+    body = " + ".join(f"[x < {name}]*f({name}, x)" for name in names)
+    given = ", ".join(names)
+    m = potto.compile(f"""def g({given}, f) integral [0, 1] ({body}) d(x)
+def h(c, {given}) g({given}, \\(a, x) . a + c*x)
+""")
+    at = [0.9 * (k + 1) / N for k in range(N)]
+    answer = potto.grad(m.h, ["c", *names])(3.0, *at)
+    exact = np.array([math.fsum(a * a / 2 for a in at), *(5 * a for a in at)])
+    assert np.all(np.abs(np.array(answer.tangent) - exact) <= np.array(answer.tangent_error) + ROUNDING)
+
+
+def test_what_a_function_decides_by_its_argument_stays() -> None:
+    """The length of a sum: `f(k, x)` is k*x, so that a summand is k/2*(k/8)^2."""
+    body = " + ".join(f"[x < {k}/8]*f({k}, x)" for k in range(1, 9))
+    m = potto.compile(f"def g(f) integral [0, 1] ({body}) d(x)\nlong = \\(n, x) . sum i in 1..n (x)\n")
+    answer = m.g(m.long)
+    exact = math.fsum(k**3 / 128 for k in range(1, 9))
+    assert abs(answer.value - exact) <= answer.error <= 1e-12 and answer.converged

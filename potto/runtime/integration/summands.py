@@ -23,15 +23,18 @@ from potto.kernels.cells import Array, Bools, Cell, Number, Value, all_arrays, c
 from potto.kernels.tape import Node
 from potto.kernels.whole import ROUNDING, UNIT_ROUNDOFF
 from potto.runtime.answers.convergence import over, widest
+from potto.runtime.evaluation.functions import Closure, Derivative
 from potto.runtime.evaluation.machine import Machine
 from potto.runtime.evaluation.sums import CHUNK
+from potto.runtime.integration.problem import linked
 
 Slots = tuple[int, ...]  # the directions in which a member moves
 SAMPLED = ("mc", "qmc")  # methods whose errors are no less for one summand than for many
 SUM = 8 * UNIT_ROUNDOFF  # what numpy's pairwise sums round off, as a part of all magnitudes, as in `sums`
-
+MOST_KNOWN = 256  # sums of which it is kept what is alike in them
 
 FUNCTION = "function"
+PLAIN = (Closure, Derivative)  # functions that are what their terms say
 
 
 class SummandBatch(Struct, frozen=True):
@@ -74,14 +77,21 @@ def _single(machine: Machine, term: Term, env: dict[str, Value]) -> Value:
 
 
 def _grouped(machine: Machine, terms: tuple[Term, ...], env: dict[str, Value]) -> Grouped:
-    """The summands by what is alike of them, for values built as these are; found once."""
+    """The summands by what is alike of them, for values built as these are, and functions that are the same; found
+    once."""
     kinds = tuple((name, _shape(value)) for name, value in env.items())
-    known = machine.linker.alike.get((terms, kinds))
+    called, _ = linked({name: value for name, value in env.items() if type(value) in PLAIN})
+    key = terms, kinds, tuple((name, term.digest) for name, term in called.items())
+    known = machine.linker.alike.get(key)
     if known is None:
         numbers = {name: shape for name, shape in kinds if FUNCTION not in _flat(shape)}
-        groups, alone = alike(terms, numbers, machine.linker.function)
+        groups, alone = alike(
+            terms, numbers, lambda f: called.get(f.name) if isinstance(f, Var) else machine.linker.function(f)
+        )
         batches = tuple((_batch(group), frozenset().union(*(terms[p].free for p in group.places))) for group in groups)
-        known = machine.linker.alike[terms, kinds] = Grouped(batches, tuple(alone))
+        known = machine.linker.alike[key] = Grouped(batches, tuple(alone))
+        if len(machine.linker.alike) > MOST_KNOWN:
+            machine.linker.alike.pop(next(iter(machine.linker.alike)), None)
     return known
 
 
@@ -180,12 +190,13 @@ def _slots(batch: SummandBatch, env: dict[str, Value], directions: int) -> list[
 
 
 def _moving(value: Value, directions: int) -> list[int]:
-    """The directions in which a value moves; a function may move in any."""
+    """The directions in which a value moves; a function with values of its own may move in any."""
     if isinstance(value, Cell):
         return [d for d, t in enumerate(value.t) if t is not None]
     if isinstance(value, tuple):
         return [d for item in value for d in _moving(item, directions)]
-    return list(range(directions))
+    still = isinstance(value, Closure) and type(value) in PLAIN and not value.captured
+    return [] if still else list(range(directions))
 
 
 def _column(column: Array | tuple[Leaf, ...] | str, env: dict[str, Value], slots: Sequence[Slots], width: int) -> Value:
