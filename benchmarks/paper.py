@@ -1,9 +1,10 @@
 """The paper's studies in one run: `python benchmarks/paper.py [--large] [--only PART] [--plot FILE]`.
 
 Programs that Teg was published with: what it takes to compile them with their gradients, to evaluate, both, and their
-size. Shaders apart against whole programs. The paper's figures at their sizes, by numpy and by machine code, with their
-goals; a mesh fitted along Potto's gradient and along one by hand. Times are those of the processor, on one thread.
-Every answer is held to another way of finding it before it has a time.
+size. The same of what the prototype was published with: a triangle in a pixel beside the figures of its authors, more
+and more jumps, shaders swapped under many. Shaders apart against whole programs. The paper's figures at their sizes, by
+numpy and by machine code, with their goals; a mesh fitted along Potto's gradient and along one by hand. Times are those
+of the processor, on one thread. Every answer is held to another way of finding it before it has a time.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterable, Iterator
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -29,13 +30,13 @@ import numpy as np  # noqa: E402
 from mesh_by_hand import loss_and_gradient  # noqa: E402
 from paper_peers import asked  # noqa: E402
 from paper_programs import PROGRAMS, Program, differences  # noqa: E402
+from paper_studies import STUDIES  # noqa: E402
+from paper_timing import HEAD, Compiled, shown, size, timed  # noqa: E402
 
 import potto  # noqa: E402
 
 EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
 BACKENDS = ("numpy", "native")
-CITED = """cited, not run here: Michel et al., OOPSLA 2024, doi 10.1145/3649843, of two image stylization benchmarks,
-the second the larger: the prototype compiles 88.1 and 441.2 times as fast as Teg, runs 2.5 and 7.9 times as fast"""
 
 
 class Row(NamedTuple):
@@ -52,45 +53,7 @@ class Row(NamedTuple):
             if self.goal != self.goal
             else f"goal {shown(self.goal)}: {'met' if self.seconds <= self.goal else 'NOT MET'}"
         )
-        return f"  {self.name:52} {shown(self.seconds):>10}  {met:24} {self.note}".rstrip()
-
-
-def shown(seconds: float) -> str:
-    return (
-        f"{seconds:.2f} s"
-        if seconds >= 1
-        else f"{seconds * 1e3:.2f} ms"
-        if seconds >= 1e-4
-        else f"{seconds * 1e6:.0f} us"
-    )
-
-
-def timed(run: Callable[[], Any], times: int = 1) -> tuple[float, Any]:
-    """The least time of the processor of several runs, and what the last gave."""
-    spent, found = [], None
-    for _ in range(times):
-        start = time.process_time()
-        found = run()
-        spent.append(time.process_time() - start)
-    return min(spent), found
-
-
-def size(module: potto.Module) -> int:
-    """How many different terms the definitions of a program are made of, as they are compiled."""
-    from potto.core.terms import postorder
-    from potto.elaborate import core
-    from potto.modules import names
-
-    db, file = module._world.db, module._file
-    return sum(len(list(postorder(core(db, file, name).term))) for name in names(db, file))
-
-
-class Compiled(NamedTuple):
-    name: str
-    compiling: float
-    evaluating: float
-    size: int
-    off: float
+        return f"  {self.name:65} {shown(self.seconds):>10}  {met:24} {self.note}".rstrip()
 
 
 def compiled(program: Program) -> Compiled:
@@ -114,26 +77,30 @@ def compiled(program: Program) -> Compiled:
     return Compiled(program.name, whole - again, again, size(module), off)
 
 
-def programs(options: argparse.Namespace) -> list[Compiled]:
-    """The programs of Teg's publication; the peers where they are."""
+def programs(options: argparse.Namespace) -> dict[str, list[Compiled]]:
+    """The programs of Teg's publication and the prototype's studies; the peers where they are."""
     print("\nprograms: from text to the gradient in all parameters, and the gradient once more")
     potto.grad(potto.compile("def f(t) integral [0, 1] [x < t]*x d(x)").f, "t")(0.4)  # what is imported is not counted
-    print(f"  {'':24} {'compile':>10} {'evaluate':>10} {'total':>10} {'size':>6} {'off by':>8}")
-    found = []
-    for row in map(compiled, PROGRAMS):
-        found.append(row)
-        times = " ".join(f"{shown(s):>10}" for s in (row.compiling, row.evaluating, row.compiling + row.evaluating))
-        print(f"  {row.name:24} {times} {row.size:>6} {row.off:8.0e}", flush=True)
+    print(HEAD)
+    found = {"Teg's programs": listed(map(compiled, PROGRAMS))}
     for peer, folder in (("teg", options.teg), ("prototype", options.prototype)):
         answer = asked(peer, folder)
         if "missing" in answer:
-            print(f"  {peer:24} SKIPPED: {answer['missing']}")
+            print(f"  {peer:34} SKIPPED: {answer['missing']}")
             continue
-        times = " ".join(
-            f"{shown(s):>10}" for s in (answer["compile"], answer["evaluate"], answer["compile"] + answer["evaluate"])
-        )
-        print(f"  {peer + ', a step':24} {times} {'':>6} {abs(answer['slope'] - 1):8.0e}")
-    print("  " + CITED.replace("\n", "\n  "))
+        off = abs(answer["slope"] - 1)
+        print(Compiled(f"{peer}, a step", answer["compile"], answer["evaluate"], 0, off))
+    for name, (title, study) in STUDIES.items():
+        print(f"\n{name}: {title}\n{HEAD}")
+        found[name] = listed(study())
+    return found
+
+
+def listed(rows: Iterable[Compiled]) -> list[Compiled]:
+    found = []
+    for row in rows:
+        print(row, flush=True)
+        found.append(row)
     return found
 
 
@@ -282,27 +249,28 @@ PARTS = {
 }
 
 
-def plot(path: str, found: list[Compiled], rows: dict[str, list[Row]]) -> None:
-    """Bars: compiling, evaluating, both, size of the programs; then the times of each part."""
+def plot(path: str, found: dict[str, list[Compiled]], rows: dict[str, list[Row]]) -> None:
+    """Bars: of programs compiling, evaluating, both, and their sizes; then the times of each part."""
     import matplotlib
 
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
 
     panels: list[tuple[str, list[str], list[float]]] = []
-    if found:
-        names = [row.name for row in found]
-        panels.append(("compile, s", names, [row.compiling for row in found]))
-        panels.append(("evaluate, s", names, [row.evaluating for row in found]))
-        panels.append(("total, s", names, [row.compiling + row.evaluating for row in found]))
-        panels.append(("size, terms", names, [row.size for row in found]))
-    for name, part in rows.items():
-        panels.append((PARTS[name][0] + ", s", [row.name for row in part], [row.seconds for row in part]))
+    for title, part in found.items():
+        for column in ("compiling", "evaluating", "total", "size"):
+            unit = "terms" if column == "size" else "s"
+            sizes = [float(getattr(row, column)) for row in part]
+            panels.append((f"{title}: {column}, {unit}", [row.name.strip() for row in part], sizes))
+    for name, times in rows.items():
+        panels.append((PARTS[name][0] + ", s", [row.name for row in times], [row.seconds for row in times]))
     figure, axes = plt.subplots(-(-len(panels) // 2), 2, figsize=(13, 2.6 * -(-len(panels) // 2)), squeeze=False)
     for axis in axes.flat[len(panels) :]:
         axis.set_axis_off()
     for axis, (title, labels, values) in zip(axes.flat, panels, strict=False):
-        axis.barh(labels[::-1], values[::-1], color="#1b6ca8")
+        places = range(len(labels), 0, -1)  # names may repeat
+        axis.barh(places, values, color=["#9a9a9a" if "published" in label else "#1b6ca8" for label in labels])
+        axis.set_yticks(places, labels)
         axis.set_xscale("log")
         axis.set_xlim(10.0 ** math.floor(math.log10(min(values))), 10.0 ** math.ceil(math.log10(max(values))))
         axis.set_title(title, fontsize=9)
@@ -321,7 +289,7 @@ def main() -> None:
     parser.add_argument("--plot", metavar="FILE", help="draw what was measured (needs matplotlib)")
     options = parser.parse_args()
     wanted = options.only or ["programs", *PARTS]
-    found = programs(options) if "programs" in wanted else []
+    found = programs(options) if "programs" in wanted else {}
     rows: dict[str, list[Row]] = {}
     for name, (title, part) in PARTS.items():
         if name in wanted:

@@ -78,8 +78,11 @@ def over_polygon(polygon: Sequence[tuple[float, float]], f: Callable[[float, flo
     return float(total)
 
 
-def by_clipping(shade: Callable[[Sequence[float], Place], float]) -> Callable[[Place], float]:
-    """The energy of a colour that is a function of the three shares of a place, and of the colours given."""
+def by_clipping(
+    shade: Callable[[Sequence[float], Place], float], from_grey: float = 0.25, exponent: int = 2
+) -> Callable[[Place], float]:
+    """The energy of a colour that is a function of the three shares of a place, and of the colours given: the square of
+    what it is off from a grey."""
 
     def exact(place: Place) -> float:
         triangle, colours = place[:6], place[6:]
@@ -89,7 +92,7 @@ def by_clipping(shade: Callable[[Sequence[float], Place], float]) -> Callable[[P
         def far(x: float, y: float) -> float:
             first = ((cx - bx) * (y - by) - (cy - by) * (x - bx)) / whole
             second = ((ax - cx) * (y - cy) - (ay - cy) * (x - cx)) / whole
-            return (shade((first, second, 1 - first - second), colours) - 0.25) ** 2
+            return (shade((first, second, 1 - first - second), colours) - from_grey) ** exponent
 
         return over_polygon(clipped(triangle), far)
 
