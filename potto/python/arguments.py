@@ -62,15 +62,18 @@ class Batch(Struct, frozen=True):
         flat = np.broadcast_to(wide, (*inner, *self.shape)).reshape(*inner, self.size)
         return np.ascontiguousarray(flat[..., 0] if self.size == 1 else flat)
 
-    def shaped(self, estimate: Estimate) -> Estimate:
-        """The estimate with every number as an array of the batch's shape; as a float if there were no arrays."""
+    def shaped(self, estimate: Estimate, own: bool = False) -> Estimate:
+        """The estimate with every number as an array of the batch's shape; as a float if there were no arrays.
+
+        own: its arrays are in nobody else's hands.
+        """
         if self.shape is None and all(
             part is None or part.__class__ is float
             for part in (estimate.value, estimate.error, estimate.tangent, estimate.tangent_error)
         ):
             return estimate
         parts = (estimate.value, estimate.error, estimate.tangent, estimate.tangent_error)
-        value, error, tangent, tangent_error = map(self.restored, parts)
+        value, error, tangent, tangent_error = (self.restored(part, own) for part in parts)
         shaped = replace(estimate, value=value, error=error, tangent=tangent, tangent_error=tangent_error)
         if self.shape is None:
             return replace(shaped, member_converged=None, shortfalls=dict.fromkeys(estimate.shortfalls, True))
@@ -109,14 +112,14 @@ class Batch(Struct, frozen=True):
         """A mask of all members."""
         return np.ones(self.shape or (), dtype=bool)
 
-    def restored(self, part: Any) -> Any:
-        """A part of an answer as an array of the batch's shape."""
+    def restored(self, part: Any, own: bool = False) -> Any:
+        """A part of an answer as an array of the batch's shape; own: a copy would be one too many."""
         if part is None:
             return None
         if isinstance(part, list):
             return self._array(part)
         if isinstance(part, tuple):
-            return alike(part, [self.restored(item) for item in part])
+            return alike(part, [self.restored(item, own) for item in part])
         if self.shape is None:
             return float(part)
         if 0 in self.shape:
@@ -124,6 +127,8 @@ class Batch(Struct, frozen=True):
         count, array = int(np.prod(self.shape)), np.asarray(part, dtype=float)
         if array.ndim > 1 and len(array) == count:  # arrays of members, put together from tiles
             return array.reshape(*self.shape, *array.shape[1:])
+        if own and array.size == count:
+            return array.reshape(self.shape)
         return np.broadcast_to(array.reshape(-1), (count,)).reshape(self.shape).copy()
 
 

@@ -126,7 +126,8 @@ def in_tiles(
         return Task(bare, tuple(cut(flat(), slice(*part)) for part in parts), wrt, chosen, wanted())
 
     key = (function._call(given).elaborated, wrt, chosen)
-    return batch.shaped(_Tiles(count, here, task, key).run(None if function._world._held else executor()))
+    found = _Tiles(count, here, task, key).run(None if function._world._held else executor())
+    return batch.shaped(found, own=True)
 
 
 # Of blocks, for functions called before, and whether larger ones would take too long; else the batch was small.

@@ -86,12 +86,13 @@ def _largest(numbers: Array, added: Array | None, most: float) -> Array:
     that there is as little of it as can be."""
     rows = numbers.reshape(-1, numbers.shape[-1])
     found = np.zeros(numbers.shape[-1]) if added is None else added.copy()
+    size = np.empty_like(found)
     for row in rows:
-        np.maximum(found, row, out=found)
-        np.maximum(found, -row, out=found)
-    bad = ~np.isfinite(found)
+        np.maximum(found, np.abs(row, out=size), out=found)
+    bad = None if found.max(initial=0.0) < math.inf else ~np.isfinite(found)
     np.minimum(found, most, out=found)
-    found[bad] = 0.0
+    if bad is not None:
+        found[bad] = 0.0
     return found
 
 
@@ -176,7 +177,9 @@ def missed(value: Any, error: Any, within: Any, settings: Settings, drawn: bool)
     v, e = np.abs(np.asarray(value, dtype=float)), np.asarray(error, dtype=float)
     v, e = np.broadcast_arrays(v, e)
     limit = rtol * v
-    bad = np.asarray(~((e <= limit) & (limit < np.inf)))
+    bad = np.asarray(~(e <= limit))
+    if not limit.max(initial=0.0) < np.inf:  # seldom, in large batches
+        bad |= ~(limit < np.inf)
     if not bad.any():
         return {}
     within = over(within, v.shape)
