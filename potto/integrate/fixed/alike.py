@@ -69,22 +69,17 @@ def _of_one_form(
     plan: StraightIntegral, degrees: Sequence[int | None], machine: Evaluator, env: dict[str, Value], batch: int
 ) -> tuple[Bools, Sums] | None:
     """The same where cuts of all have the same formulas."""
-    here = {name: env[name] for name in plan.names}
-    done = np.zeros(batch, dtype=bool)
-    total = [np.zeros((1 + machine.directions, batch)) for _ in range(4)]
-    for start in range(0, batch, MEMBERS):
-        stop = min(start + MEMBERS, batch)
-        some = here if stop - start == batch else gather(here, np.arange(start, stop))
-        sums = [row[:, start:stop] for row in total]
-        done[start:stop], cells = topologies(plan, machine, some, stop - start)
-        for cell in cells:
-            fine = _settled(plan, degrees, machine, some, cell, sums)
-            done[start + cell.members[~fine]] = False
-            if batch == 1 and not done[0]:
-                return None
+    done, total = _added(plan, degrees, machine, env, batch, batch <= FEW)
     if not done.any():
         return None
-    done &= _fine(machine, env, total)
+    fine = _fine(machine, env, total)
+    rough = np.flatnonzero(done & ~fine)
+    if batch > FEW and 0 < rough.size <= FEW:  # of few cells rounding is followed at all nodes, and known better
+        done[rough], again = _added(plan, degrees, machine, gather(env, rough), rough.size, False)
+        for whole, part in zip(total, again, strict=True):
+            whole[:, rough] = part
+        fine = _fine(machine, env, total)
+    done &= fine
     if not done.any():
         return None
     number, truncated, rounding, gross = total
@@ -94,6 +89,28 @@ def _of_one_form(
         for part in (number, error, added):
             part[:, ~done] = 0.0
     return done, Sums(number[None, 0], error[None, 0], number[None, 1:], error[None, 1:], gross=added)
+
+
+def _added(
+    plan: StraightIntegral, degrees: Sequence[int | None], machine: Evaluator, env: dict[str, Value], batch: int,
+    tight: bool,
+) -> tuple[Bools, list[Array]]:  # fmt: skip
+    """Which members rules do for, and the integrals of these, what rules and rounding put them off, and what is added
+    up for them, (1 + k, batch) each."""
+    here = {name: env[name] for name in plan.names}
+    done = np.zeros(batch, dtype=bool)
+    total = [np.zeros((1 + machine.directions, batch)) for _ in range(4)]
+    for start in range(0, batch, MEMBERS):
+        stop = min(start + MEMBERS, batch)
+        some = here if stop - start == batch else gather(here, np.arange(start, stop))
+        sums = [row[:, start:stop] for row in total]
+        done[start:stop], cells = topologies(plan, machine, some, stop - start)
+        for cell in cells:
+            fine = _settled(plan, degrees, machine, some, cell, sums, tight)
+            done[start + cell.members[~fine]] = False
+            if batch == 1 and not done[0]:
+                return done, total
+    return done, total
 
 
 def _fine(machine: Evaluator, env: dict[str, Value], total: Sequence[Array]) -> Bools:
@@ -122,19 +139,19 @@ def _fine(machine: Evaluator, env: dict[str, Value], total: Sequence[Array]) -> 
 
 def _settled(
     plan: StraightIntegral, degrees: Sequence[int | None], machine: Evaluator, env: dict[str, Value], cell: Alike,
-    total: Sequence[Array],
+    total: Sequence[Array], tight: bool,
 ) -> Bools:  # fmt: skip
     """Add the integrals over cells of one shape to those of their members; for which of them that could be done."""
     fine = np.zeros(cell.members.size, dtype=bool)
     todo = np.arange(cell.members.size)
     exact = [None if d is None else d // 2 + 1 for d in degrees] or [None] * len(plan.variables)
     if None in exact:
-        rules, todo = proved_rules(plan, exact, machine, env, cell)
+        rules, todo = proved_rules(plan, exact, machine, env, cell, tight)
         left = [_applied(rule, env, those, total, fine) for rule, those in rules]
         todo = np.concatenate((*left, todo))
         if not todo.size:
             return fine
-    for rule in _tried(plan, exact, machine, env, cell, todo):
+    for rule in _tried(plan, exact, machine, env, cell, todo, tight):
         todo = _applied(rule, env, todo, total, fine)
         if not todo.size:
             break
@@ -148,15 +165,14 @@ def _applied(rule: ProductRule, env: dict[str, Value], todo: Ints, total: Sequen
         todo = todo[np.argsort(rule.cell.between.take(todo), kind="stable")]
     for start in range(0, todo.size, step):
         index = todo[start : start + step]
-        found = rule.applied(env, index)
-        good = rule.good(found)
+        found, owners = rule.applied(env, index), rule.cell.members.take(index)
+        good = rule.good(found, total[0].take(owners, 1) if todo.size <= FEW else None)
         parts = [found.number, found.truncated, found.rounding, found.gross]
         if not good.all():
             left.append(index[~good])
             for part in parts:
                 part[:, ~good] = 0.0
         fine[index] = good
-        owners = rule.cell.members.take(index)
         first, last = int(owners.min()), int(owners.max()) + 1
         owners -= first
         for whole, part in zip(total, parts, strict=True):
@@ -173,18 +189,19 @@ def _tried(
     env: dict[str, Value],
     cell: Alike,
     todo: Ints,
+    tight: bool,
 ) -> list[ProductRule]:
     """Rules with ever more nodes: the one that does for a polynomial, or from the one on that does for most cells."""
     known = tuple(n is not None for n in exact)
     tried = [
-        ProductRule(plan, cell, orders, known, machine)
+        ProductRule(plan, cell, orders, known, machine, tight)
         for order in ORDERS
         if math.prod(orders := tuple(order if n is None else n for n in exact)) <= MOST_NODES
     ]
     if all(known):
         return tried[:1]
     if todo.size <= FEW:
-        return tried[PROBE:]
+        return tried[PROBE:] if tight else tried
     few = todo[:: max(1, todo.size // PILOTS)]
     first = tried[: PROBE + 1]
     foreseen = first[-1].foreseen(env, few, first)

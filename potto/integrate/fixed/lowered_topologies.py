@@ -35,6 +35,16 @@ class Found(Struct, frozen=True):
     members: Ints
     sides: Ints
 
+    def with_others(self, others: Found, members: Ints) -> Found:
+        """The same with what was found of members who were not plain."""
+        plain = self.plain.copy()
+        plain[members] = others.plain
+        rows = np.concatenate((self.rows, others.rows), axis=-1)
+        owners, sides = (np.concatenate(pair) for pair in (
+            (self.members, members.take(others.members)), (self.sides, others.sides)
+        ))  # fmt: skip
+        return Found(plain, rows, owners, sides)
+
 
 class LoweredTopologies(Struct, frozen=True):
     """The function for parameters with these parts."""

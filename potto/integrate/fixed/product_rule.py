@@ -49,7 +49,7 @@ class ProductRule(Struct, frozen=True):
     """A product rule for cells of one shape, with so many nodes for each variable.
 
     exact: the variables whose coefficients need not tell what it leaves out, as of polynomials. beyond: what is proved
-    that it leaves out of each cell, (1 + k, cells).
+    that it leaves out of each cell, (1 + k, cells). tight: whether all digits are wanted.
     """
 
     plan: StraightIntegral
@@ -57,6 +57,7 @@ class ProductRule(Struct, frozen=True):
     orders: tuple[int, ...]
     exact: tuple[bool, ...]
     machine: Evaluator
+    tight: bool
     beyond: Array | None = None
 
     @property
@@ -121,9 +122,9 @@ class ProductRule(Struct, frozen=True):
         rounding = (ELSEWHERE if self._several(index) else 1.0) * raw.off + ELSEWHERE * SUMMED * gross
         return Measured(raw.number, truncated, rounding, gross)
 
-    def good(self, found: Measured) -> Bools:
-        """For which cells the rule does."""
-        few = self.cell.members.size <= FEW
-        asked = (TIGHT if few else SHARE * self.machine.rtol) * np.abs(found.number)
-        least = (TIGHT if few else CANCELS) * found.gross
+    def good(self, found: Measured, known: Array | None = None) -> Bools:
+        """For which cells the rule does. known: what is known already of the whole that each goes into."""
+        size = np.abs(found.number) if known is None else np.maximum(np.abs(found.number), np.abs(known))
+        asked = (TIGHT if self.tight else SHARE * self.machine.rtol) * size
+        least = (TIGHT if self.tight else CANCELS) * found.gross
         return np.asarray((found.truncated <= np.maximum(asked, least)).all(axis=0))

@@ -52,7 +52,12 @@ class _Grid(Struct, frozen=True):
 
 
 def proved_rules(
-    plan: StraightIntegral, exact: Sequence[int | None], machine: Evaluator, env: dict[str, Value], cell: Alike
+    plan: StraightIntegral,
+    exact: Sequence[int | None],
+    machine: Evaluator,
+    env: dict[str, Value],
+    cell: Alike,
+    tight: bool,
 ) -> tuple[list[tuple[ProductRule, Ints]], Ints]:
     """Rules with the cells that they are for, and the cells for which there are none.
 
@@ -86,7 +91,9 @@ def proved_rules(
         beyond[1 + d, index] = error * _speed(grid, env, members, d)
     exactly = (True,) * len(plan.variables)
     parts = _shared(nodes)
-    rules = [(ProductRule(plan, cell, orders, exactly, machine, beyond), index[own]) for orders, own in parts.items()]
+    rules = [
+        (ProductRule(plan, cell, orders, exactly, machine, tight, beyond), index[own]) for orders, own in parts.items()
+    ]
     return rules, index[nodes[0] == 0]
 
 

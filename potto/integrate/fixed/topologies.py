@@ -76,6 +76,10 @@ def topologies(
         found = _found(plan, tracking, here, batch)
     else:
         found = _by_either(plan, tracking, env, here, batch)
+    left = np.flatnonzero(~found.plain)
+    if not moving and 0 < left.size <= FEW:
+        there = {name: _spread(value, left.size, True) for name, value in gather(env, left).items() if name in here}
+        found = found.with_others(_found(plan, machine.tracking(), there, left.size, True), left)
     return found.plain, _gathered(plan, machine, found)
 
 
@@ -91,22 +95,31 @@ def _by_either(
         return _found(plan, machine, here, batch)
 
 
-def _found(plan: StraightIntegral, machine: Evaluator, here: dict[str, Value], batch: int) -> Found:
-    """All cells of plain members, by numpy: for one variable after the other, those of all members at once."""
+def _found(
+    plan: StraightIntegral, machine: Evaluator, here: dict[str, Value], batch: int, merging: bool = False
+) -> Found:
+    """All cells of plain members, by numpy: for one variable after the other, those of all members at once.
+
+    merging: cuts of the outermost variable that are one and move as one count once.
+    """
     plain = np.ones(batch, dtype=bool)
     cells = _Cells(np.empty((0, 2, batch), dtype=np.int64), np.arange(batch), here)
     for i in range(len(plan.variables)):
-        cells = _along(plan, i, machine, cells, plain)
+        cells = _along(plan, i, machine, cells, plain, merging and not i)
     sides = _sides(plan, machine, cells, plain)
     kept = np.flatnonzero(plain.take(cells.members))
     return Found(plain, cells.rows.take(kept, -1), cells.members.take(kept), sides.take(kept))
 
 
-def _along(plan: StraightIntegral, i: int, machine: Evaluator, cells: _Cells, plain: Bools) -> _Cells:
+def _along(
+    plan: StraightIntegral, i: int, machine: Evaluator, cells: _Cells, plain: Bools, merging: bool
+) -> _Cells:  # fmt: skip
     """The stretches of one variable more, within those so far."""
     frame = plan.frames[i]
     values = evaluated(frame, machine, {name: cells.env[name] for name in frame.params})
     places, off = _rows(values, cells.members.size)
+    if merging:
+        places[_again(plan, i, values, places)] = np.nan
     if machine.costs is not None:
         for surface, rows in plan.jumps[i]:
             roots = [(values[row].v, values[row].t) for row in rows]
@@ -189,6 +202,24 @@ def _rows(values: tuple[Cell, ...], count: int) -> tuple[Array, Array]:
         places[unknown & np.isinf(places) & one_sided] = np.nan
         off[unknown & ~np.isnan(places)] = np.inf  # roots that merge just here: they are there, and nothing is known
     return places, off
+
+
+def _again(plan: StraightIntegral, i: int, values: tuple[Cell, ...], places: Array) -> Bools:
+    """Which rows (R, M) are another cut once more: in the same place, to the last bit, with the same speeds, as is the
+    fold of a disc whose sections leave a pixel just there. Between them is nothing, to first order, and as what is
+    further in goes on across them, less than rounding; where it jumps, however little lies between counts. One that
+    turns is the cut, as ends of stretches by it are like square roots."""
+    speeds = [[0.0 if t is None else t for t in cell.t] for cell in values]
+    numbers = np.array([[place, *(np.broadcast_to(t, place.shape) for t in own)]
+                        for place, own in zip(places, speeds, strict=True)])  # fmt: skip
+    same = (numbers[:, None] == numbers).all(axis=2)
+    jumping = {row for _, rows in plan.jumps[i] for row in rows}
+    going_on = [row for row in range(2, len(places)) if row not in jumping]
+    first = sorted(going_on, key=lambda row: row not in plan.turning[i])
+    again = np.zeros(places.shape, dtype=bool)
+    for n, row in enumerate(first):
+        again[row] = same[row, first[:n]].any(axis=0)
+    return again
 
 
 def in_order(places: Array, off: Array) -> tuple[Ints, Ints, Bools]:

@@ -25,7 +25,6 @@ START_ORDER = 11
 ORDERS = (4, 6, 10, 14, 18)
 PILOTS = 64
 BATCH = 4096  # members integrated at once
-FEW_TURNED = 16  # members up to which it does not pay to look for rules along other variables
 FEW = 64  # members for which it does not pay to look for those that nothing cuts
 MOST_AXES = 2  # of a product rule for one member: with 4,096 nodes 14 of each of three, which hardly ever are enough
 
@@ -65,8 +64,6 @@ def cut_up(plan: Plan, machine: Machine, env: dict[str, Value], batch: int, turn
     sums: Sums | None = None
     rest = np.arange(batch)
     for own in chain((plan,), turned):
-        if own is not plan and rest.size <= FEW_TURNED:
-            break
         with one_thread():
             found = _alike(own, machine, env if sums is None else gather(env, rest), rest.size)
         if found is not None:
