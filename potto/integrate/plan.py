@@ -36,7 +36,6 @@ from potto.core.terms import (
     Sum,
     Term,
     Tuple,
-    Var,
     children,
     function_of,
     integral,
@@ -44,6 +43,7 @@ from potto.core.terms import (
     postorder,
     prim,
     substitute,
+    var,
     with_integrand,
 )  # fmt: skip
 from potto.integrate.fixed.boxes import Box, box_of
@@ -310,7 +310,7 @@ def _degrees(body: Term, levels: Sequence[LevelPlan]) -> tuple[int | None, ...]:
 
 def inlined(term: Integral, inline: Resolve) -> Term:
     """The integrand with calls of known functions carried out."""
-    passed = {n.name: f for n in postorder(term.body) if isinstance(n, Var) and (f := inline(n)) is not None}
+    passed = {name: f for name in sorted(term.body.free) if (f := inline(var(name))) is not None}
     return expanded(substitute(term.body, passed), inline)
 
 
