@@ -17,7 +17,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, wait
 from contextlib import nullcontext
 from functools import cache
-from itertools import groupby
+from itertools import groupby, pairwise
 from typing import TYPE_CHECKING, Any
 
 from msgspec import Struct, field
@@ -136,15 +136,15 @@ _sizes: dict[Any, tuple[int, bool]] = {}
 
 class _Tiles(Struct):
     """One batch. key: for whom the size of blocks is kept. done: the answers so far, by the first member of their
-    block. tried: those of blocks that only told the size. again: how many blocks were lost. spent: seconds that the
-    last block took that was evaluated here."""
+    block. tried: those of blocks that only told the size, with that member. again: how many blocks were lost. spent:
+    seconds that the last block took that was evaluated here."""
 
     count: int
     here: Callable[[Part], Estimate]
     task: Callable[[list[Part]], Task]
     key: Any
     done: dict[int, Estimate] = field(default_factory=dict)
-    tried: list[Estimate] = field(default_factory=list)
+    tried: list[tuple[int, Estimate]] = field(default_factory=list)
     blocks: list[Part] = field(default_factory=list)
     again: int = 0
     spent: float = 0.0
@@ -155,6 +155,8 @@ class _Tiles(Struct):
             try:
                 self._all(pool, told)
             except KeyboardInterrupt:
+                if not (self.blocks and self.done):
+                    self.blocks = self._salvaged()
                 if not self.done:
                     raise
                 raise Interrupted(self.estimate()) from None
@@ -206,14 +208,14 @@ class _Tiles(Struct):
         while self.spent < LONG and BLOCKS * size <= self.count:
             first = self.count // (2 * AHEAD * size) * AHEAD * size
             each = self._again_at((first, first + size)) / size
-            self.tried.append(self.done.pop(first))
+            self.tried.append((first, self.done.pop(first)))
             larger, most = (first, first + AHEAD * size), FALLS * each * AHEAD * size
             self._alone(larger)
             if self.spent > most:
                 self._again_at(larger)
             last = self.done.pop(first)
             if self.spent > most:
-                self.tried.append(last)
+                self.tried.append((first, last))
                 break
             size *= AHEAD
             self._put_aside()
@@ -224,13 +226,31 @@ class _Tiles(Struct):
         """The seconds that a block takes when what it needs was made, by one like it."""
         if block[0] not in self.done:
             self._alone(block)
-        self.tried.append(self.done[block[0]])
+        self.tried.append((block[0], self.done[block[0]]))
         self._alone(block)
         return self.spent
 
     def _put_aside(self) -> None:
-        self.tried += self.done.values()
+        self.tried += self.done.items()
         self.done.clear()
+
+    def _salvaged(self) -> list[Part]:
+        """The blocks of a batch that was interrupted while their size was tried: of those that were, the largest ones
+        that are apart, and what is missing."""
+
+        def end(first: int, part: Estimate) -> int:
+            return first + int(part.member_converged.size)
+
+        for first, part in sorted(self.tried, key=lambda each: -each[1].member_converged.size):
+            if all(end(first, part) <= other or end(other, own) <= first for other, own in self.done.items()):
+                self.done[first] = part
+        self.tried = [(first, part) for first, part in self.tried if self.done.get(first) is not part]
+        edges = [
+            0,
+            *(edge for first, part in sorted(self.done.items()) for edge in (first, end(first, part))),
+            self.count,
+        ]
+        return [(start, stop) for start, stop in pairwise(edges) if stop > start]
 
     def _alone(self, block: Part) -> Estimate:
         # By the clock, a processor that others use as well would be a slow function.
@@ -289,17 +309,16 @@ class _Tiles(Struct):
     def estimate(self) -> Estimate:
         """All that is done, in order."""
         some = next(iter(self.done.values()))
-        blocks = self.blocks or [(0, some.member_converged.size), (some.member_converged.size, self.count)]
         parts: list[Estimate] = []
-        for done, run in groupby(blocks, lambda block: block[0] in self.done):
+        for done, run in groupby(self.blocks, lambda block: block[0] in self.done):
             together = list(run)  # what is missing is one part, however many blocks it would have been
             parts += (
                 [self.done[first] for first, _ in together]
                 if done
                 else [unfinished(some, together[-1][1] - together[0][0])]
             )
-        found = with_what_was_made(joined(parts), self.tried)
-        stats = {**found.stats, "blocks": len(blocks)}
+        found = with_what_was_made(joined(parts), [part for _, part in self.tried])
+        stats = {**found.stats, "blocks": len(self.blocks)}
         if self.again:
             stats["blocks done again"] = self.again
         return replace(found, seconds=time.perf_counter() - self.start, stats=stats)

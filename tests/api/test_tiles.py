@@ -182,7 +182,8 @@ def test_a_large_batch_is_not_held_to_the_blocks_of_a_small_one(module: Any, mon
     """Where nothing takes long, a batch is one block, whatever was asked before."""
     monkeypatch.setattr(tiles, "ENOUGH", 1e9)
     monkeypatch.setattr(tiles, "LONG", 1e9)
-    monkeypatch.setattr(tiles, "LITTLE", 0.0)
+    monkeypatch.setattr(tiles, "LONG", 1e9)
+    monkeypatch.setattr(tiles, "LITTLE", -1.0)
     assert [module.pair(np.linspace(0, 1, count)).stats["blocks"] for count in (2100, 9000, 2100)] == [1, 1, 1]
 
 
@@ -305,6 +306,30 @@ def test_an_interrupt_keeps_what_is_done(module: Any, monkeypatch: pytest.Monkey
     assert (found.value[:640] == whole.value[:640]).all() and np.isnan(found.value[640:]).all()
     assert found.member_converged[:640].all() and not found.member_converged[640:].any() and not found.converged
     assert found.reasons_of(700) == (INTERRUPTED.message,)
+
+
+@pytest.mark.parametrize("last", [1, 3])
+def test_an_interrupt_while_the_size_of_blocks_is_tried(last: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """64 members, then 128, 256 and so on: the last block that was done is kept, though it only told the size."""
+    program, alone, sizes = potto.compile("def f(x) x*x"), tiles._Tiles._alone, list[int]()
+
+    def interrupted(self: Any, block: tuple[int, int]) -> Any:
+        if len(sizes) == last:
+            raise KeyboardInterrupt
+        sizes.append(block[1] - block[0])
+        return alone(self, block)
+
+    monkeypatch.setattr(tiles, "ENOUGH", 1e9)
+    monkeypatch.setattr(tiles, "LONG", 1e9)
+    monkeypatch.setattr(tiles, "LITTLE", -1.0)
+    monkeypatch.setattr(tiles._Tiles, "_alone", interrupted)
+    x = np.arange(float(COUNT))
+    with pytest.raises(potto.Interrupted) as stop:
+        program.f(x)
+    found, done = stop.value.estimate, sizes[-1]
+    assert sizes == [64, 128, 256][:last]
+    assert (found.value[:done] == x[:done] ** 2).all() and np.isnan(found.value[done:]).all()
+    assert found.member_converged[:done].all() and not found.member_converged[done:].any()
 
 
 def test_workers_are_not_waited_for_after_an_interrupt() -> None:
