@@ -1,7 +1,7 @@
 """The programs of the gallery beside those that sample first, and what was said of the same questions elsewhere.
 
-Owns `Beside` and `besides`. Numbers are those of `examples/beside.py`, by JAX where it is installed; what was said
-elsewhere stands in a table of `docs/worlds.md`, which is read here.
+Owns `Beside`, `besides` and `sampled_by`. Numbers are those of `examples/beside.py`, by JAX where it is installed; what
+was said elsewhere stands in a table of `docs/worlds.md`, which is read here.
 """
 
 from __future__ import annotations
@@ -31,9 +31,14 @@ class Beside:
     address: str
 
 
+def sampled_by() -> str:
+    """What samples are summed up by, and differentiated."""
+    return "JAX" if importlib.util.find_spec("jax") else "numpy"
+
+
 def besides(folder: str) -> list[Beside]:
     """Those of a folder of examples, in order."""
-    sampler = by_jax if importlib.util.find_spec("jax") else by_numpy
+    sampler = by_jax if sampled_by() == "JAX" else by_numpy
     told = {program: rest for program, *rest in _told()}
     nothing = ["", "", ""]
     return [

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from besides import Beside
+from besides import Beside, sampled_by
 from made import Made, Shown
 
 STYLE = """
@@ -112,7 +112,8 @@ def _compared(besides: Sequence[Beside]) -> str:
     heads = ("program", "value", "of samples", "derivative", "of their sum", "time", "of samples", "elsewhere")
     head = "".join(f"<th>{name}</th>" for name in heads)
     body = "".join(f"<tr>{row}</tr>" for row in rows)
-    return f'<h3>Beside samples</h3><table class="measured"><tr>{head}</tr>{body}</table>'
+    about = f"<p>A program that sums up samples, and the derivative of its sum, by {sampled_by()}.</p>"
+    return f'<h3>Beside samples</h3>{about}<table class="measured"><tr>{head}</tr>{body}</table>'
 
 
 def contact_sheet(chapters: Sequence[Section], folder: Path) -> str:

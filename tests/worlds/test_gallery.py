@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import subprocess
 import sys
 import xml.etree.ElementTree as ET
@@ -105,6 +106,7 @@ def test_programs_are_shown_beside_samples(tmp_path: Path) -> None:
     page = (tmp_path / "index.html").read_text(encoding="utf-8")
     row = page.partition("<code>paper/image</code>")[2].partition("</tr>")[0]
     assert "-0.19649107" in row and "github.com/ChezJrk/Teg" in row  # the slope of the sum lacks the edge
+    assert f"by {'JAX' if importlib.util.find_spec('jax') else 'numpy'}.</p>" in page
 
 
 @pytest.mark.slow
