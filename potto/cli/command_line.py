@@ -16,8 +16,8 @@ from potto import __version__
 from potto.cli import COMMANDS, module_of
 from potto.cli.console import Console, standard_console
 
-# Of the garbage collector: nearly all that a command loads and makes stays. At 50,000 objects a first look at them takes
-# 14 of the 280 ms of a small `eval`, with the thresholds of Python all of them 20.
+# Of the garbage collector: nearly all that a command loads and makes stays. At 50,000 objects a first look at them
+# takes 14 of the 280 ms of a small `eval`; with Python's own thresholds it is 20.
 THRESHOLDS = (200_000, 20, 20)
 
 

@@ -125,19 +125,20 @@ def slopes(tangent: Any, *factors: Any) -> Any:
     """What a tangent rounds off that is a sum of slopes times tangents, given one after the other, where the slopes are
     exact: nothing as long as all are whole, so that the slope of 2*x is 2, and not 2 give or take something. Summands
     may cancel."""
-    pairs = list(zip(factors[::2], factors[1::2], strict=True))
     if isinstance(tangent, np.ndarray) and tangent.size > _looking.most:
-        return max(len(pairs), 2) * UNIT_ROUNDOFF * _sizes(pairs)
+        return max(len(factors) // 2, 2) * UNIT_ROUNDOFF * _sizes(factors)
+    pairs = list(zip(factors[::2], factors[1::2], strict=True))
     products = [a * b for a, b in pairs]
     off = sum(0.0 if _is_one(a) or _is_one(b) else mul(p, a, b) for p, (a, b) in zip(products, pairs, strict=True))
     return off if len(pairs) == 1 else off + add(tangent, *products)
 
 
-def _sizes(pairs: Sequence[tuple[Any, Any]]) -> Any:
-    """The sum of the sizes of products; the slopes of sums are 1."""
+def _sizes(factors: Sequence[Any]) -> Any:
+    """The sum of the sizes of products, of slopes and tangents one after the other; the slopes of sums are 1."""
     total: Any = None
-    for a, b in pairs:
-        size = abs(b) if _is_one(a) else abs(a * b)
+    for at in range(0, len(factors), 2):
+        a, b = factors[at], factors[at + 1]
+        size = abs(b if a.__class__ is float and (a == 1.0 or a == -1.0) else a * b)
         total = size if total is None else total + size
     return total
 

@@ -109,7 +109,7 @@ def summed(
         lo, width, off = _between(ends)
         for name in variables[:i]:
             here[name] = here[name].map(_deeper)  # type: ignore[union-attr]
-        moves = [not {cell.t[d] is None for cell in frame} <= {True} for d in range(k)]
+        moves = [_moves(frame, d) for d in range(k)]
         here[variable] = placed = _placed(lo, width, off, layout.nodes[i], i > 0, moves)
         if not i:
             length, rounded = width, off
@@ -122,6 +122,14 @@ def summed(
     if len(variables) > 1:
         values = values @ gauss(region.inner[-1]).weights
     return _added(values, length * layout.weights, rounded * layout.weights, layout.count)
+
+
+def _moves(frame: Sequence[Cell], d: int) -> bool:
+    """Whether any of the cells moves along a direction."""
+    for cell in frame:  # noqa: SIM110 - runs with every call: no generator
+        if cell.t[d] is not None:
+            return True
+    return False
 
 
 def _deeper(array: Array) -> Array:

@@ -39,9 +39,9 @@ At = Callable[[dict[str, Any]], MovingTotals | None]
 class SettledRegion(Struct, frozen=True, eq=False):
     """An integral all over a region of its parameters, which run along tangents that stay the same.
 
-    box: per parameter, between which numbers. truncation: a bound of what the rule leaves out, of the value and each
-    tangent. straight: the function of machine code with what is around it; None where numpy adds up: for good, or until
-    the function that it stands in for, which is `awaited`, is due.
+    machine: one that keeps track of rounding. box: per parameter, between which numbers. truncation: a bound of what
+    the rule leaves out, of the value and each tangent. straight: the function of machine code with what is around it;
+    None where numpy adds up: for good, or until the function that it stands in for, which is `awaited`, is due.
     """
 
     plan: StraightIntegral
@@ -60,7 +60,7 @@ class SettledRegion(Struct, frozen=True, eq=False):
         """faces: integrands with their functions of machine code; none where numpy adds up."""
         places = tuple((name, low, high) for name, (low, high) in box.items())
         straight = by_machine_code(places, faces, truncation, machine.rtol, machine.atol) if faces else None
-        return cls(plan, region, machine, places, truncation, straight, awaited)
+        return cls(plan, region, machine.tracking(), places, truncation, straight, awaited)
 
     def at(self, env: dict[str, Any]) -> MovingTotals | None:
         """The value and its tangents; None outside of the region, and where they are not accurate enough."""
@@ -73,7 +73,7 @@ class SettledRegion(Struct, frozen=True, eq=False):
             return None
         plan, machine = self.plan, self.machine
         with np.errstate(all="ignore"), nullcontext() if self.awaited is None else self.awaited.by_numpy():
-            frame = evaluated(plan.frames[0], machine.tracking(), env)
+            frame = evaluated(plan.frames[0], machine, env)
             found = summed(plan.variables, plan.frames, self.region, machine, env, frame)
         return None if found is None else accurate(found, self.truncation, machine.rtol, machine.atol)
 
