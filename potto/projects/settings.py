@@ -45,7 +45,7 @@ class Settings(Struct, frozen=True):
     method: how integrals are estimated; "auto" cuts and integrates by quadrature where the dimension allows it.
     rtol, atol: the accuracy asked for; an estimate converged when its error is within `max(atol, rtol * |value|)`.
     Where nobody asked, `mc` and `qmc` are held against SAMPLED, which is within the reach of `samples`. What cancels to
-    0 has converged when its error is within 1e-12 of what cancels (`runtime/answers/convergence.py`).
+    0 has converged when its error is within 1e-12 of what cancels (`runtime/answers/allowances.py`).
     samples: points of a Monte Carlo estimate.
     seed: where its random numbers start; equal seeds give equal answers.
     max_evals: the most evaluations of an integrand before the answer comes as it is, marked as not converged.

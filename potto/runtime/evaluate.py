@@ -23,7 +23,6 @@ from potto.kernels.cells import Cell, Number, Rows, Value, all_cells
 from potto.kernels.making import counts
 from potto.projects.settings import DEFAULTS, Settings
 from potto.runtime.answers.convergence import (
-    CANCELS,
     Shortfalls,
     converged_members,
     members_of,
@@ -35,6 +34,7 @@ from potto.runtime.answers.estimate import Estimate, OneSided
 from potto.runtime.answers.inherited_errors import rough, widened
 from potto.runtime.evaluation.arrays import array, element, length
 from potto.runtime.evaluation.duals import call_derivative, call_paired
+from potto.runtime.evaluation.few_members import told_alone
 from potto.runtime.evaluation.folds import fold
 from potto.runtime.evaluation.functions import Closure, Derivative
 from potto.runtime.evaluation.kinks import note_kink
@@ -103,13 +103,13 @@ class Program:
         """The value of a term, with every internal limit turned into a PottoError."""
         given = env or {}
 
-        def found(machine: Machine) -> Value:
+        def found(machine: Machine, given: Mapping[str, Value] = given) -> Value:
             short = self.shortest(term) if given else None
             value = None if short is None else guarded(lambda: short.value(machine, given))
             return guarded(lambda: machine.term(self.linker.ready(term), dict(given))) if value is None else value
 
         try:
-            value = found(machine)
+            value = told_alone(found(machine), machine, given, found)
         except PottoError as error:
             raise self.placed(error) from None
         return widened(value, machine, found) if machine.record.used and not machine.directions else value
@@ -272,20 +272,31 @@ def _missing(flat: list[tuple[Any, Any]], machine: Machine) -> Shortfalls:
     reasons = {**record.shortfalls, **{why: True for why, _ in machine.events.every(Shortfall)}}
     before = dict(reasons)
     drawn = not record.methods.isdisjoint(("mc", "qmc"))
-    within = record.within if record.methods else CANCELS
     for number, error in flat:
-        found = missed(number, error, within, settings, drawn)
+        found = missed(number, error, record.allowed, settings, drawn)
         if not found or any(where is True for where in before.values()):
             continue
-        if not record.methods:  # of 1/0, and of infinity times 0, no integral is to blame
-            found.pop(INFINITE, None)
-            if NO_VALUE in found:
-                merged(found, {NOT_A_NUMBER: found.pop(NO_VALUE)})
+        found = _blamed(found, record.allowed.over(np.shape(number)).finite)
         if found and any(rough(answer, settings.rtol, settings.atol) for answer in record.used.values()):
             found = {ROUGH: np.logical_or.reduce(list(found.values()))}
         told = converged_members(before, np.shape(number))
         merged(reasons, {why: where & told if np.ndim(where) else where for why, where in found.items()})
     return {why: where for why, where in reasons.items() if np.any(where)}
+
+
+def _blamed(found: Shortfalls, finite: Any) -> Shortfalls:
+    """Reasons without integrals that are to blame where all of them are finite: not of 1/0 and infinity times 0."""
+    out: Shortfalls = {}
+    for why, where in found.items():
+        if why not in (INFINITE, NO_VALUE):
+            merged(out, {why: where})
+            continue
+        to_blame, others = np.logical_and(where, ~np.asarray(finite)), np.logical_and(where, finite)
+        if to_blame.any():
+            merged(out, {why: to_blame if np.ndim(where) else True})
+        if others.any() and why is NO_VALUE:
+            merged(out, {NOT_A_NUMBER: others if np.ndim(where) else True})
+    return out
 
 
 def _as_named(term: Term, machine: Machine) -> Term:

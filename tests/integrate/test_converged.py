@@ -72,6 +72,8 @@ LOST = [  # 1, beside what is 1e16 times as large
     "integral [0, 1] (if [x < t] then 1e16 + 1 else 1 - 1e16) d(x)",
     "integral [-1, 1] (1e17*(t - 0.5 + 1)*x^3 + 1/2) d(x)",
     "integral ([0, 1], [0, 1]) (1e16*[x < t] - 1e16*[x > t] + 1) d(x, y)",
+    "1e16*integral [0, 1] [x < t] d(x) - 1e16*integral [0, 1] [x > t] d(x) + 1",
+    "1e16*integral [0, 1] ([x < t] - [x > t]) d(x) + 1",
 ]
 
 
@@ -100,6 +102,35 @@ def test_a_zero_by_cancellation_has_converged(body: str) -> None:
     answer = rate(body, 0.5)
     assert abs(answer.value) <= answer.error <= 1e-12 and abs(answer.tangent) <= answer.tangent_error <= 1e-12
     assert answer.converged, answer.reasons
+
+
+SCALED = [  # an integral that is 0 in proportion to a factor outside of it: odd, or of nothing
+    "1e4*integral [-1e-5, 1e-5] sin(t*x)*(2 + cos(x)) d(x)",
+    "(integral [-1e-5, 1e-5] sin(t*x)*(2 + cos(x)) d(x))/1e-4",
+    "exp(9)*integral ([-1e-3, 1e-3], [0, 1e-3]) (sin(x*y) + t*x^3) d(x, y)",
+]
+
+
+@pytest.mark.parametrize("body", SCALED)
+def test_a_factor_outside_of_an_integral_scales_what_its_error_may_be(body: str) -> None:
+    """The integrals are 0 by symmetry, and rounding leaves less than 1e-12 of what is added up."""
+    answer = rate(body, 0.5)
+    assert abs(answer.value) <= answer.error <= 1e-12 and abs(answer.tangent) <= answer.tangent_error <= 1e-12
+    assert answer.converged, answer.reasons
+
+
+def test_of_an_infinite_value_no_finite_integral_is_to_blame() -> None:
+    """As 1/0 by itself; of an integral that is infinite it is said."""
+    f = potto.compile("def f(x, t) 1/x + integral [0, 1] [y < t]*exp(y) d(y)").f
+    alone, batch = f(0.0, 0.5), f(np.array([0.0, 1.0]), 0.5)
+    assert alone.value == INF and alone.converged and not alone.reasons
+    assert batch.member_converged.all() and abs(batch.value[1] - math.exp(0.5)) <= batch.error[1] <= 1e-12
+    slope = potto.deriv(f)((0.0, 1.0), 0.5)
+    assert slope.tangent == -INF and slope.reasons == ("the derivative is infinite here",)
+    none = potto.compile("def f(x, t) (1/x)*x + integral [0, 1] [y < t]*exp(y) d(y)").f(0.0, 0.5)
+    assert none.reasons == ("the value is not a number",)
+    pole = potto.compile("def f(x) integral [0, 1] x/y d(y)").f
+    assert pole(1.0).value == INF and "integral" in pole(1.0).reasons[0] and not pole(1.0).converged
 
 
 def test_what_was_asked_for_counts() -> None:

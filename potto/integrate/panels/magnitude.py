@@ -13,7 +13,7 @@ from potto.integrate.pieces import Sums
 from potto.integrate.rules.substitution import Segments
 from potto.kernels.cells import Array, Bools, Ints
 
-# One rounding, in units of the accuracy by which what is added up counts (`runtime/answers/convergence`).
+# One rounding, in units of the accuracy by which what is added up counts (`runtime/answers/allowances`).
 ROUNDING = 2.0**-12
 
 

@@ -1,24 +1,19 @@
 """Whether an answer is as accurate as was asked for; and if not, why, member by member.
 
-Owns `Shortfalls`, `missed`, `missing`, `precise`, `rounded` and `allowance`. Converged means: the error is within
-`rtol * |value|`, or within `atol`. An answer that is 0 because its parts cancel has no digits that could be relative to
-it. It is accurate enough if it is relative to what is added up without regard to sign: there its error is within
-`rtol`, and within CANCELS, which is what rounding leaves. That is no licence to lose a small summand beside large ones
-(1e16 - 1e16 + 1): where the integrand adds anything, what is added up counts as 1 at most, so that CANCELS is an
-absolute bound.
+Owns `Shortfalls`, `missed`, `missing`, `precise` and `rounded`. Converged means: the error is within `rtol * |value|`,
+or within `atol`. An answer that is 0 because its parts cancel has no digits that could be relative to it: what its
+error may be then, `allowances` says.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping, Sequence
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from msgspec.structs import replace
 
-from potto.core.terms import Branch, Const, Integral, Prim, Proj, Term, Tuple, Var, children
+from potto.core.terms import Integral
 from potto.integrate.events import (
     INFINITE,
     NO_BOUND,
@@ -35,10 +30,8 @@ from potto.integrate.events import (
 from potto.integrate.pieces import Sums, added_up, together
 from potto.kernels.cells import Array, Bools, Number, Value
 from potto.projects.settings import Settings
+from potto.runtime.answers.allowances import Allowance, allowance
 
-CANCELS = 1e-12
-# What is added up counts as so much at most, where something small could be lost in it.
-UNIT = 1.0
 # What is a speck, beside the largest of a batch.
 SPECK = 1e-15
 # From which part of a value on an error is more than rounding, and up to which it is nothing else.
@@ -46,60 +39,6 @@ LOST, ONLY_ROUNDED = 0.1, 1e-6
 
 # Why answers are not as accurate as asked for, and of which members of a batch: a mask, or True for all of them.
 Shortfalls = dict[Shortfall, Any]
-
-
-@lru_cache(maxsize=4096)
-def adds_nothing(body: Term) -> bool:
-    """Whether no summand can be lost beside a larger one: products and builtins alone, under whatever conditions."""
-    todo, seen = [body], set()
-    while todo:
-        term = todo.pop()
-        if term in seen:
-            continue
-        seen.add(term)
-        if isinstance(term, Branch):
-            todo += (term.then, term.orelse)
-        elif isinstance(term, Const | Var | Tuple | Proj) or (isinstance(term, Prim) and term.op not in ("add", "sub")):
-            todo += children(term)
-        else:
-            return False
-    return True
-
-
-def allowance(term: Integral, sums: Sums, rtol: float) -> Any:
-    """The error of each of a batch of integrals up to which it, or its derivative, is 0 as accurately as asked for."""
-    if sums.v.size == 1 and sums.gross is not None:  # numpy takes its time over a single number
-        rates = float(max(sums.gross[1, 0], *map(abs, sums.t.flat), 0.0))
-        return allowance_of_one(term, float(sums.gross[0, 0]), rates, rtol)
-    most = np.inf if adds_nothing(term.body) else UNIT
-    share = min(rtol, CANCELS)
-    added = (None, None) if sums.gross is None else sums.gross
-    value, rate = _largest(sums.v, added[0], most), _largest(sums.t, added[1], UNIT)
-    np.maximum(value, rate, out=value)
-    value *= share
-    return value
-
-
-def _largest(numbers: Array, added: Array | None, most: float) -> Array:
-    """Per member of a batch, (B,), the largest of its numbers (..., B) without regard to sign and of what was added up
-    for them, up to `most`; 0 for what is infinite, or not a number. Over large batches it is memory that takes time, so
-    that there is as little of it as can be."""
-    rows = numbers.reshape(-1, numbers.shape[-1])
-    found = np.zeros(numbers.shape[-1]) if added is None else added.copy()
-    size = np.empty_like(found)
-    for row in rows:
-        np.maximum(found, np.abs(row, out=size), out=found)
-    bad = None if found.max(initial=0.0) < math.inf else ~np.isfinite(found)
-    np.minimum(found, most, out=found)
-    if bad is not None:
-        found[bad] = 0.0
-    return found
-
-
-def allowance_of_one(term: Integral, gross: float, rates: float, rtol: float) -> float:
-    """The same for a single integral: from what is added up for its value, and the most for one of its derivatives."""
-    value = 0.0 if gross == math.inf else gross if adds_nothing(term.body) else min(gross, UNIT)
-    return min(rtol, CANCELS) * max(value, min(rates, UNIT) if rates < math.inf else 0.0)
 
 
 def missing(term: Integral, sums: Sums, settings: Settings, env: dict[str, Value]) -> Bools:
@@ -149,28 +88,8 @@ def rounded(sums: Sums) -> Bools:
     return out
 
 
-def widest(before: Any, after: Any) -> Any:
-    """Two allowances, numbers or arrays over batches, as one; of batches that do not go together the least."""
-    if isinstance(before, float) and isinstance(after, float):
-        return max(before, after)
-    try:
-        return np.maximum(before, after)
-    except ValueError:
-        return max(float(np.min(before)), float(np.min(after)))
-
-
-def over(within: Any, shape: tuple[int, ...]) -> Any:
-    """An allowance over a batch of this shape: of one that does not go together with it the least."""
-    if not np.ndim(within) or np.shape(within) == shape:
-        return within
-    try:
-        return np.broadcast_to(within, shape)
-    except ValueError:
-        return float(np.min(within, initial=np.inf))
-
-
-def missed(value: Any, error: Any, within: Any, settings: Settings, drawn: bool) -> Shortfalls:
-    """Why numbers are not as accurate as was asked for. `drawn`: they are made of samples; within: see `allowance`."""
+def missed(value: Any, error: Any, allowed: Allowance, settings: Settings, drawn: bool) -> Shortfalls:
+    """Why numbers are not as accurate as was asked for. `drawn`: they are made of samples."""
     rtol = settings.asked(drawn)
     if isinstance(value, float) and isinstance(error, float) and error <= rtol * abs(value) < np.inf:
         return {}
@@ -182,9 +101,9 @@ def missed(value: Any, error: Any, within: Any, settings: Settings, drawn: bool)
         bad |= ~(limit < np.inf)
     if not bad.any():
         return {}
-    within = over(within, v.shape)
-    size, off, allowed = v[bad], e[bad], np.broadcast_to(within, v.shape)[bad]  # few of a large batch
-    wrong = ~((off <= settings.atol) | (off <= rtol * size) | (off <= allowed)) | np.isnan(size)
+    within = np.broadcast_to(allowed.over(v.shape).error(settings.rtol), v.shape)
+    size, off = v[bad], e[bad]  # few of a large batch
+    wrong = ~((off <= settings.atol) | (off <= rtol * size) | (off <= within[bad])) | np.isnan(size)
     bad[bad] = np.where(np.isinf(size), ~np.isfinite(off), wrong)  # an infinity may be known to be one
     if not bad.any():
         return {}

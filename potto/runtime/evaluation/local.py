@@ -119,13 +119,13 @@ def _quietly(machine: Machine, env: Env, run: Run) -> Value | None:
     """What `run` gives, unless it has something to say of directions, which are not those that were asked for, or there
     is no derivative in one of them."""
     record, apart = machine.record, machine.apart()
-    kept = dict(record.shortfalls), list(record.edges), record.within
+    kept = dict(record.shortfalls), list(record.edges), record.allowed
     value = run(apart, env)
     if len(record.edges) == len(kept[1]) and all(map(_smooth, all_cells(value))):
         for event, members in apart.events:
             machine.note(event, members)
         return value
-    record.shortfalls, record.edges, record.within = kept
+    record.shortfalls, record.edges, record.allowed = kept
     return None
 
 

@@ -21,6 +21,7 @@ from potto.integrate.decomposition.root_isolation import Isolated
 from potto.integrate.events import Events, OneSidedDerivatives, Shortfall, TwoSided
 from potto.kernels.cells import Array, Value
 from potto.kernels.tape import Node
+from potto.runtime.answers.allowances import NOTHING, Allowance
 from potto.runtime.answers.convergence import Shortfalls, merged
 
 
@@ -114,7 +115,7 @@ class Record(Struct):
     the whole of what was asked for, or True and numbers for one.
     met: how often something was met that has two derivatives; taped: what it moves with on a tape, if there is one, as
     nodes and the members of these.
-    within: the error up to which what cancels is 0 as accurately as asked for, of all or of each of the batch.
+    allowed: what may be off of what cancels, of all or of each of the batch.
     culled: integrals that are 0 for certain, and were not evaluated. seen: such as were answered without a plan.
     cells: on how many stretches roots have been looked for; each counts as an evaluation where a budget is asked.
     isolated: the roots that were found.
@@ -130,7 +131,7 @@ class Record(Struct):
     taped: list[tuple[Node, Any]] = []
     methods: set[str] = set()
     second: bool = False
-    within: Any = 0.0
+    allowed: Allowance = NOTHING
     start: int = 0
     members: int = 1
     cells: int = 0

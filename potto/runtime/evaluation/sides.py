@@ -30,7 +30,7 @@ from potto.kernels.cells import (
     pad,
 )
 from potto.kernels.errors import Coincidence
-from potto.runtime.answers.convergence import over, widest
+from potto.runtime.answers.allowances import NOTHING
 from potto.runtime.evaluation.beside import SAME as ALIKE
 from potto.runtime.evaluation.beside import Parts, approached, moved, one_direction, parameter_step
 from potto.runtime.evaluation.linker import Linker
@@ -123,22 +123,21 @@ def _both(machine: Machine, given: Value, members: Ints | None, beside: Callable
     """What `beside` finds on either side for some members by themselves. The record is left as it was, but that what is
     added up there counts for how much may be off."""
     record, batch = machine.record, _batch(given)
-    allowed: Any = 0.0
-    kept = record.shortfalls, record.edges, record.within
+    allowed = NOTHING
+    kept = record.shortfalls, record.edges, record.allowed
     try:
         with nullcontext(machine.apart()) if members is None else machine.among(members) as apart:
             given = given if members is None else map_arrays(given, lambda a: a[members])
             sides = []
             for side in (-1, 1):
-                record.shortfalls, record.edges, record.within = {}, [], 0.0
+                record.shortfalls, record.edges, record.allowed = {}, [], NOTHING
                 sides.append(beside(apart, given, side))
-                allowed = widest(allowed, record.within)
+                allowed = allowed.and_of(record.allowed)
     finally:
-        record.shortfalls, record.edges, record.within = kept
+        record.shortfalls, record.edges, record.allowed = kept
     if members is not None:
-        own, allowed = allowed, np.zeros(batch)
-        allowed[members] = over(own, members.shape)
-    record.within = widest(record.within, allowed)
+        allowed = allowed.put(members, int(np.prod(batch)), batch)
+    record.allowed = record.allowed.and_of(allowed)
     return sides[0], sides[1]
 
 

@@ -17,7 +17,7 @@ from potto.diagnostics import PottoError
 from potto.kernels import errors
 from potto.kernels.cells import Cell, Number, Rows, Trace, Value, all_arrays, combined, listed, map_arrays, map_cells
 from potto.kernels.whole import LARGEST, SHORT, UNIT_ROUNDOFF, looked_through
-from potto.runtime.answers.convergence import over, widest
+from potto.runtime.answers.allowances import NOTHING
 from potto.runtime.evaluation.machine import Machine
 from potto.runtime.evaluation.selection import Pick, apart
 
@@ -51,17 +51,17 @@ def total(machine: Machine, term: Sum, lo: Value, hi: Value, env: dict[str, Valu
     step = max(1, CHUNK // max(1, int(np.prod(shape))))
     machine = machine if shape else machine.changed(summed=True)
     record, result = machine.record, None
-    met, within = record.met, record.within
+    met, allowed = record.met, record.allowed
     for start in range(int(first), int(last) + 1, step):
         index = np.arange(start, min(start + step, int(last) + 1), dtype=float)
         wide[term.variable] = Cell(index, None, (None,) * machine.directions)
-        record.within = 0.0
+        record.allowed = NOTHING
         with looked_through(0 if integrates else SHORT):
             value = machine.run(body, [wide[p] for p in params], None)
-        within = widest(within, _of_all(record.within, shape, index.size))
+        allowed = allowed.and_of(record.allowed.added(shape, index.size))
         part = _reduce(value, shape, index.size)
         result = part if result is None else _plus(result, part)
-    record.within = within
+    record.allowed = allowed
     record.spread(met)
     assert result is not None
     return result
@@ -113,15 +113,6 @@ def _grouped(machine: Machine, term: Sum, first: Number, last: Number, env: dict
         return total(machine, term, Cell(float(a)), Cell(float(b)), here, None)
 
     return apart([(lo == a) & (hi == b) for a, b in pairs], env, evaluated)
-
-
-def _of_all(within: Any, shape: tuple[int, ...], count: int) -> Any:
-    """The allowance of a sum: at least as much is added up as for the term that most is added up for."""
-    wide = over(within, (*shape, count))
-    if not np.ndim(wide):
-        return wide
-    most = wide.max(axis=-1)
-    return most if shape else float(most)
 
 
 def _reduce(value: Value, shape: tuple[int, ...], count: int) -> Value:

@@ -22,7 +22,8 @@ from potto.kernels.cells import Array, Cell, Env, Ints, Rows, Value, all_arrays,
 from potto.kernels.making import making
 from potto.kernels.tape import Edge, Node
 from potto.kernels.whole import UNIT_ROUNDOFF
-from potto.runtime.answers.convergence import merged, over, widest
+from potto.runtime.answers.allowances import NOTHING
+from potto.runtime.answers.convergence import merged
 from potto.runtime.evaluation.functions import Closure
 from potto.runtime.evaluation.machine import Machine
 from potto.runtime.evaluation.reach import Reach, kept
@@ -167,24 +168,20 @@ def _evaluated(
     """The answers for pairs, of members and summands; what there is to be said of one is said of its member."""
     at, those = pairs
     record, body = machine.record, lam(tuple(sorted(here)), term.body)
-    kept = record.shortfalls, record.within
-    record.shortfalls, record.within = {}, 0.0
+    kept = record.shortfalls, record.allowed
+    record.shortfalls, record.allowed = {}, NOTHING
     try:
         plain = _plain(term.body, machine.linker.reach)
         alone = machine.changed(into=at, of=those if machine.taping else None) if plain else machine
         value = alone.run(body, [here[name] for name in body.params], None)
-        told, within = record.shortfalls, record.within
+        told, allowed = record.shortfalls, record.allowed
     finally:
-        record.shortfalls, record.within = kept
+        record.shortfalls, record.allowed = kept
     for why, where in told.items():
         mask = np.zeros(size, dtype=bool)
         mask[at[np.broadcast_to(where, at.shape)]] = True
         merged(record.shortfalls, {why: mask.reshape(shape) if shape else bool(mask.any())})
-    if np.ndim(within):
-        most = np.zeros(size)
-        np.maximum.at(most, at, over(within, at.shape))
-        within = most.reshape(shape) if shape else float(most[0])
-    record.within = widest(record.within, within)
+    record.allowed = record.allowed.and_of(allowed.put(at, size, shape))
     return value
 
 

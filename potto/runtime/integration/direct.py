@@ -8,6 +8,7 @@ rule. What the rule does not settle, or what the arguments are not made for, tak
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -39,7 +40,7 @@ from potto.integrate.fixed.settled import SettledRegion
 from potto.integrate.fixed.straight import StraightIntegral
 from potto.kernels.cells import Cell, Value, map_arrays, pad
 from potto.kernels.making import making
-from potto.runtime.answers.convergence import allowance_of_one, widest
+from potto.runtime.answers.allowances import Allowance, allowance_of_one
 from potto.runtime.evaluation.duals import merge, split
 from potto.runtime.evaluation.functions import Closure
 from potto.runtime.evaluation.linker import Linker
@@ -81,7 +82,9 @@ class Direct(Struct, frozen=True):
         record.integrals += 1
         record.methods.add("quadrature")
         rates = max(*found.gross[1:], *map(abs, found.number[1:]), 0.0, 0.0)
-        record.within = widest(record.within, allowance_of_one(self.term, found.gross[0], rates, machine.rtol))
+        most = allowance_of_one(self.term, found.gross[0], rates, machine.rtol)
+        finite = all(map(math.isfinite, found.number))
+        record.allowed = record.allowed.and_of(Allowance(most, max(found.error) <= most, finite))
         cell = Cell(found.number[0], found.error[0], tuple(found.number[1:]), tuple(found.error[1:]))
         return split(cell) if self.dual else cell
 

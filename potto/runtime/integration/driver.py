@@ -22,7 +22,7 @@ from potto.integrate.pieces import INTO, OF, Sums, gather, still
 from potto.kernels import errors
 from potto.kernels.cells import Array, Cell, Ints, Value, all_arrays, map_arrays, pad
 from potto.kernels.making import making
-from potto.runtime.answers.convergence import allowance, widest
+from potto.runtime.answers.allowances import left_by
 from potto.runtime.evaluation.functions import Chosen, choices, settled
 from potto.runtime.evaluation.local import locally
 from potto.runtime.evaluation.machine import Machine
@@ -147,10 +147,7 @@ def _integrate(machine: Machine, term: Integral, env: dict[str, Value], outermos
             machine.note(event.outside())
         return _shaped(sums, shape)
     record.tell(problem.events, batch, shape)
-    within = allowance(term, sums, machine.rtol)
-    if not isinstance(within, float):
-        within = within.reshape(shape) if np.ndim(within) and shape else float(np.max(within))
-    record.within = widest(record.within, within)
+    record.allowed = record.allowed.and_of(left_by(term, sums, machine.rtol, shape))
     return _shaped(sums, shape)
 
 

@@ -22,7 +22,7 @@ from potto.kernels import errors
 from potto.kernels.cells import Array, Bools, Cell, Number, Value, all_arrays, combined, map_arrays, pad
 from potto.kernels.tape import Node
 from potto.kernels.whole import ROUNDING, UNIT_ROUNDOFF
-from potto.runtime.answers.convergence import over, widest
+from potto.runtime.answers.allowances import NOTHING
 from potto.runtime.evaluation.functions import Closure, Derivative
 from potto.runtime.evaluation.machine import Machine
 from potto.runtime.evaluation.sums import CHUNK
@@ -138,21 +138,19 @@ def _evaluated(
     slots = _slots(batch, env, machine.directions)
     width = max(map(len, slots))
     args = [_column(column, env, slots, width) for column in batch.columns]
-    kept = record.shortfalls, record.edges, record.within
-    record.shortfalls, record.edges, record.within = {}, [], 0.0
+    kept = record.shortfalls, record.edges, record.allowed
+    record.shortfalls, record.edges, record.allowed = {}, [], NOTHING
     try:
         with machine.among(np.arange(size)) as together:
             together = together.changed(summed=not shape)
             own = together if machine.taping and width else together.with_directions(width)
             value = pad(own.run(batch.function, args, None), width)
-        within, told = (
-            over(record.within, (*shape, size)),
-            [*record.shortfalls.values(), *(np.isfinite(e.backward) for e in record.edges)],
-        )
+        allowed = record.allowed.over((*shape, size))
+        told = [*record.shortfalls.values(), *(np.isfinite(e.backward) for e in record.edges)]
     except PottoError:  # as it is written, it says what is wrong, and where
         return None, ~bad
     finally:
-        record.shortfalls, record.edges, record.within = kept
+        record.shortfalls, record.edges, record.allowed = kept
     if not isinstance(value, Cell):
         raise errors.not_a_number(value)
     told += [np.isnan(value.v), np.isinf(value.v), *([] if value.e is None else [~np.isfinite(value.e)])]
@@ -162,14 +160,13 @@ def _evaluated(
         return None, bad
     parts = _Parts(value, (*shape, size), slots, machine)
     whole = parts.total(~bad)
-    if record.methods.isdisjoint(SAMPLED) and (lacking := parts.lacking(whole, machine.rtol, within) & ~bad).any():
+    lacking = parts.lacking(whole, machine.rtol, allowed.most) & ~bad
+    if record.methods.isdisjoint(SAMPLED) and lacking.any():
         bad |= lacking
         if bad.all():
             return None, bad
         whole = parts.total(~bad)
-    if np.shape(within) == (*shape, size):
-        within = within[..., ~bad].max(axis=-1)
-    record.within = widest(record.within, within if shape else float(np.min(within)))
+    record.allowed = record.allowed.and_of(allowed.added(shape, size, ~bad))
     return whole, bad
 
 

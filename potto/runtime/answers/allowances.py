@@ -1,0 +1,165 @@
+"""How large an error may be of what is 0, or nearly, because its parts cancel.
+
+Owns `Allowance`, what the integrals of an evaluation leave of it, and `allowance`, that of integrals by themselves. No
+error is relative to what has cancelled. It is measured by what is added up without regard to sign: it has to be within
+`rtol` of it, and within CANCELS, which is what rounding leaves. That is no licence to lose a small summand beside large
+ones (1e16 - 1e16 + 1): where the integrand adds anything, what is added up counts as UNIT at most, so that CANCELS is
+an absolute bound.
+
+What stands outside of an integral scales both its error and what is added up for it: `f(t)/h^2` is as accurate as f(t).
+So an integral whose errors are within its own allowance counts as a number without one, and what is made of nothing
+else is measured as arithmetic is, by UNIT. By the linear propagation of errors it is then within the allowances of its
+integrals, scaled as they are.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from msgspec import Struct
+
+from potto.core.terms import Branch, Const, Integral, Prim, Proj, Term, Tuple, Var, children
+from potto.integrate.pieces import Sums
+from potto.kernels.cells import Array, Bools, Ints
+
+CANCELS = 1e-12
+# What is added up counts as so much at most, where something small could be lost in it.
+UNIT = 1.0
+
+
+class Allowance(Struct, frozen=True):
+    """What may be off of all members of a batch, or of each, as numbers or arrays.
+
+    most: the largest allowance of an integral. kept: whether each integral's errors are within its own. finite:
+    whether their values and derivatives are.
+    """
+
+    most: Any = 0.0
+    kept: Any = True
+    finite: Any = True
+
+    def and_of(self, other: Allowance) -> Allowance:
+        """That of what is made of the integrals of both; of batches that do not go together the least."""
+        if isinstance(self.most, float) and isinstance(other.most, float):
+            return Allowance(max(self.most, other.most), self.kept and other.kept, self.finite and other.finite)
+        try:
+            return Allowance(np.maximum(self.most, other.most), *map(np.logical_and, self.holds, other.holds))
+        except ValueError:
+            ends = self.over(()), other.over(())
+            return ends[0].and_of(ends[1])
+
+    def over(self, shape: tuple[int, ...]) -> Allowance:
+        """The same over a batch of this shape: of one that does not go together with it the least."""
+        if not np.ndim(self.most) or np.shape(self.most) == shape:
+            return self
+        try:
+            return Allowance(*(np.broadcast_to(part, shape) for part in (self.most, *self.holds)))
+        except ValueError:
+            return Allowance(float(np.min(self.most, initial=np.inf)), *(bool(np.all(part)) for part in self.holds))
+
+    def added(self, shape: tuple[int, ...], count: int, those: Bools | None = None) -> Allowance:
+        """That of sums of so many summands, the last axis, over a batch of this shape: at least as much is added up as
+        for the summand that most is added up for. those: the summands that count."""
+        wide = self.over((*shape, count))
+        if not np.ndim(wide.most):
+            return wide
+        here = slice(None) if those is None else those
+        most, *holds = wide.most[..., here].max(axis=-1), *(part[..., here].all(axis=-1) for part in wide.holds)
+        return Allowance(most, *holds) if shape else Allowance(float(most), *map(bool, holds))
+
+    def put(self, members: Ints, size: int, shape: tuple[int, ...]) -> Allowance:
+        """That of a batch of this shape, of so many members, by that of what goes into these."""
+        if not np.ndim(self.most):
+            return self
+        own, most, holds = self.over(members.shape), np.zeros(size), np.ones((2, size), dtype=bool)
+        np.maximum.at(most, members, own.most)
+        for part, here in zip(holds, own.holds, strict=True):
+            np.logical_and.at(part, members, here)
+        if not shape:
+            return Allowance(float(most[0]), *map(bool, holds[:, 0]))
+        return Allowance(most.reshape(shape), *holds.reshape(2, *shape))
+
+    @property
+    def holds(self) -> tuple[Any, Any]:
+        return self.kept, self.finite
+
+    def error(self, rtol: float) -> Any:
+        """The error up to which an answer is 0 as accurately as asked for."""
+        arithmetic = min(rtol, CANCELS) * UNIT
+        if isinstance(self.kept, bool):
+            return np.maximum(self.most, arithmetic) if self.kept else self.most
+        return np.where(self.kept, np.maximum(self.most, arithmetic), self.most)
+
+
+NOTHING = Allowance()
+
+
+def left_by(term: Integral, sums: Sums, rtol: float, shape: tuple[int, ...]) -> Allowance:
+    """What a batch of integrals leaves to what is made of them."""
+    within = allowance(term, sums, rtol)
+    if sums.v.size == 1:
+        most = float(np.max(within))
+        kept = (sums.e <= most).all() and (sums.et <= most).all()
+        return Allowance(most, bool(kept), bool(np.isfinite(sums.v).all() and np.isfinite(sums.t).all()))
+    kept = (sums.e <= within).all(axis=0) & (sums.et <= within).all(axis=(0, 1))
+    finite = np.isfinite(sums.v).all(axis=0) & np.isfinite(sums.t).all(axis=(0, 1))
+    if shape:
+        return Allowance(*(part.reshape(shape) for part in (within, kept, finite)))
+    return Allowance(float(np.max(within)), bool(kept.all()), bool(finite.all()))
+
+
+@lru_cache(maxsize=4096)
+def adds_nothing(body: Term) -> bool:
+    """Whether no summand can be lost beside a larger one: products and builtins alone, under whatever conditions."""
+    todo, seen = [body], set()
+    while todo:
+        term = todo.pop()
+        if term in seen:
+            continue
+        seen.add(term)
+        if isinstance(term, Branch):
+            todo += (term.then, term.orelse)
+        elif isinstance(term, Const | Var | Tuple | Proj) or (isinstance(term, Prim) and term.op not in ("add", "sub")):
+            todo += children(term)
+        else:
+            return False
+    return True
+
+
+def allowance(term: Integral, sums: Sums, rtol: float) -> Any:
+    """The error of each of a batch of integrals up to which it, or its derivative, is 0 as accurately as asked for."""
+    if sums.v.size == 1 and sums.gross is not None:  # numpy takes its time over a single number
+        rates = float(max(sums.gross[1, 0], *map(abs, sums.t.flat), 0.0))
+        return allowance_of_one(term, float(sums.gross[0, 0]), rates, rtol)
+    most = np.inf if adds_nothing(term.body) else UNIT
+    share = min(rtol, CANCELS)
+    added = (None, None) if sums.gross is None else sums.gross
+    value, rate = _largest(sums.v, added[0], most), _largest(sums.t, added[1], UNIT)
+    np.maximum(value, rate, out=value)
+    value *= share
+    return value
+
+
+def _largest(numbers: Array, added: Array | None, most: float) -> Array:
+    """Per member of a batch, (B,), the largest of its numbers (..., B) without regard to sign and of what was added up
+    for them, up to `most`; 0 for what is infinite, or not a number. Over large batches it is memory that takes time, so
+    that there is as little of it as can be."""
+    rows = numbers.reshape(-1, numbers.shape[-1])
+    found = np.zeros(numbers.shape[-1]) if added is None else added.copy()
+    size = np.empty_like(found)
+    for row in rows:
+        np.maximum(found, np.abs(row, out=size), out=found)
+    bad = None if found.max(initial=0.0) < math.inf else ~np.isfinite(found)
+    np.minimum(found, most, out=found)
+    if bad is not None:
+        found[bad] = 0.0
+    return found
+
+
+def allowance_of_one(term: Integral, gross: float, rates: float, rtol: float) -> float:
+    """The same for a single integral: from what is added up for its value, and the most for one of its derivatives."""
+    value = 0.0 if gross == math.inf else gross if adds_nothing(term.body) else min(gross, UNIT)
+    return min(rtol, CANCELS) * max(value, min(rates, UNIT) if rates < math.inf else 0.0)
