@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 from types import EllipsisType
 from typing import Any
 
@@ -40,14 +41,17 @@ class Untaped(Exception):
 
 class Edge:
     """From a node to one that it was made of: `slope` times it, the slope off by `off`, and rounded itself unless it is
-    `kept`; or its members moved about, by what `pull` is the adjoint of."""
+    `kept`; or its members moved about, by what `pull` is the adjoint of. A slope that is `fixed` does not move: where
+    it is 0 nothing depends on the parent."""
 
-    __slots__ = ("kept", "off", "parent", "pull", "slope")
+    __slots__ = ("fixed", "kept", "off", "parent", "pull", "slope")
 
     def __init__(
-        self, parent: Node, slope: Any = 1.0, off: Any = None, pull: Pull | None = None, kept: bool = False
-    ) -> None:
-        self.parent, self.slope, self.off, self.pull, self.kept = parent, slope, off, pull, kept
+        self, parent: Node, slope: Any = 1.0, off: Any = None, pull: Pull | None = None, kept: bool = False,
+        fixed: bool = False,
+    ) -> None:  # fmt: skip
+        self.parent, self.slope, self.off, self.pull = parent, slope, off, pull
+        self.kept, self.fixed = kept, fixed
 
 
 class Node:
@@ -115,13 +119,13 @@ class Node:
         return move(*args, **given)
 
 
-def linear(*edges: tuple[Any, Any, Any], kept: bool = False) -> Any:
-    """The sum of (slope, tangent, what the slope is off); what is no node is 0. kept: no slope is rounded itself."""
+def linear(*edges: tuple[Any, Any, Any], kept: bool = False, fixed: bool = False) -> Any:
+    """The sum of (slope, tangent, what the slope is off); what is no node is 0. kept, fixed: as of `Edge`."""
     made: list[Edge] = []
     shape: Shape = ()
     for slope, parent, off in edges:
         if parent.__class__ is Node:
-            made.append(Edge(parent, slope, off, kept=kept))
+            made.append(Edge(parent, slope, off, kept=kept, fixed=fixed))
             if parent.shape or not isinstance(slope, float):
                 shape = np.broadcast_shapes(shape, np.shape(slope), parent.shape)
         elif parent is not None and np.any(np.asarray(parent) != 0):
@@ -132,6 +136,11 @@ def linear(*edges: tuple[Any, Any, Any], kept: bool = False) -> Any:
 def multiples(*edges: tuple[Any, Any, Any]) -> Any:
     """The sum of numbers as they are times tangents, as `linear`."""
     return linear(*edges, kept=True)
+
+
+def scaled(edge: tuple[Any, Any, Any]) -> Any:
+    """A tangent times a number that does not move."""
+    return linear(edge, kept=True, fixed=True)
 
 
 def scattered(masks: Sequence[Any], rows: Sequence[Any], shape: Shape) -> Any:
@@ -268,17 +277,25 @@ def swept(answers: Sequence[tuple[Node, Any]]) -> dict[Node, Swept]:
     sums: dict[Node, Accumulated] = {}
     for node, weight in answers:
         _gather(sums, node, Accumulated(weight, abs(weight), 0.0, _is_whole(weight)))
+    marks: dict[Node, Any] = {}
+
+    def used(node: Node) -> Any:
+        if not marks:
+            marks.update(_marked((node, np.not_equal(weight, 0)) for node, weight in answers))
+        return marks[node]
+
     found: dict[Node, Swept] = {}
     order = _in_order([node for node, _ in answers])
     most = _largest(order, len(answers))
     for node in reversed(order):
         own = sums.pop(node)
         if not node.edges:
-            found[node] = own.value, own.error
+            nowhere = np.isnan(own.value)
+            found[node] = own.value, np.where(nowhere, np.inf, own.error) if np.any(nowhere) else own.error
         for edge in node.edges:
             pull = edge.pull
             if pull is None:
-                _gather(sums, edge.parent, _along(edge, own, most))
+                _gather(sums, edge.parent, _along(edge, own, most, partial(used, node)))
             else:
                 _gather(sums, edge.parent, Accumulated(pull(own.value), pull(own.size), pull(own.error), own.whole))
     return found
@@ -286,8 +303,12 @@ def swept(answers: Sequence[tuple[Node, Any]]) -> dict[Node, Swept]:
 
 def reached(nodes: Iterable[tuple[Node, Any]]) -> dict[Node, Any]:
     """The seeds that these members of nodes are made of, and which members of them, however steeply."""
+    return {node: own for node, own in _marked(nodes).items() if not node.edges}
+
+
+def _marked(nodes: Iterable[tuple[Node, Any]]) -> dict[Node, Any]:
+    """All nodes that these members of some are made of, and which members of them."""
     marks: dict[Node, Any] = {}
-    found: dict[Node, Any] = {}
 
     def mark(node: Node, part: Any) -> None:
         own = np.asarray(_fitted(np.asarray(part, dtype=float), node.shape)) > 0
@@ -296,12 +317,11 @@ def reached(nodes: Iterable[tuple[Node, Any]]) -> dict[Node, Any]:
     for node, members in nodes:
         mark(node, members)
     for node in reversed(_in_order(marks)):
-        own = marks.pop(node)
-        if not node.edges:
-            found[node] = own
+        own = marks[node]
         for edge in node.edges:
-            mark(edge.parent, own if edge.pull is None else edge.pull(own.astype(float)))
-    return found
+            there = own & np.not_equal(edge.slope, 0) if edge.fixed else own
+            mark(edge.parent, there if edge.pull is None else edge.pull(own.astype(float)))
+    return marks
 
 
 def pushed(nodes: Sequence[Node], directions: Sequence[Node]) -> list[list[Swept]]:
@@ -319,8 +339,8 @@ def pushed(nodes: Sequence[Node], directions: Sequence[Node]) -> list[list[Swept
     return [[(None, None) if x is None else (x.value, x.error) for x in known[node]] for node in nodes]
 
 
-def _along(edge: Edge, x: Accumulated, most: float) -> Accumulated:
-    """What comes to the other end of an edge, in either direction."""
+def _along(edge: Edge, x: Accumulated, most: float, used: Callable[[], Any] = lambda: True) -> Accumulated:
+    """What comes to the other end of an edge, in either direction. used: which members anything depends on."""
     slope, whole = edge.slope, x.whole and edge.kept
     if slope.__class__ is float and slope == 1.0 and edge.off is None:
         whole = whole and bool(np.all(x.size <= most))
@@ -330,7 +350,7 @@ def _along(edge: Edge, x: Accumulated, most: float) -> Accumulated:
     whole = whole and _is_whole(slope) and bool(np.all(size <= most))
     error = _times(steep, x.error) if whole else _times(steep, x.error) + TWICE * size
     return Accumulated(
-        _times(slope, x.value), size, error if edge.off is None else error + _times(edge.off, x.size), whole
+        _times(slope, x.value, used), size, error if edge.off is None else error + _times(edge.off, x.size), whole
     )
 
 
@@ -369,10 +389,11 @@ def _fitted(part: Any, shape: Shape) -> Any:
     return np.broadcast_to(part, shape) if shape else float(part)
 
 
-def _times(slope: Any, adjoint: Any) -> Any:
-    """A slope times an adjoint; 0 where the answer does not depend on the number, however steep that is there."""
+def _times(slope: Any, adjoint: Any, used: Callable[[], Any] = lambda: False) -> Any:
+    """A slope times an adjoint; 0 where the answer does not depend on the number, however steep that is there. Where it
+    does, and has a slope of 0 by it as sqrt(x)^2 by sqrt(x) at 0, there is no telling."""
     found = slope * adjoint
     if isinstance(found, float):
-        return 0.0 if found != found and adjoint == 0 else found
+        return 0.0 if found != found and adjoint == 0 and not used() else found
     wrong = np.isnan(found)
-    return np.where(wrong & (np.asarray(adjoint) == 0), 0.0, found) if wrong.any() else found
+    return np.where(wrong & (np.asarray(adjoint) == 0) & ~used(), 0.0, found) if wrong.any() else found

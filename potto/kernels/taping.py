@@ -31,16 +31,17 @@ class TapeLines(Lines):
                     more.append(f"{(own.part - 1) * UNIT_ROUNDOFF!r}*abs({slope})")
                 off = self.total([f"abs({self.product(found, e)})" for found, e in bends] + more)
                 edges.append((slope, args[i].t[0], off))
-        return self.linear(edges, exact_slopes(op, args, 0) is not None)
+        still = op == "mul" and len(edges) == 1
+        return self.linear(edges, "scaled" if still else "linear" if exact_slopes(op, args, 0) is None else "multiples")
 
     def added(self, args: Sequence[Scalar]) -> Tangents:
-        return self.linear([(ONE, x.t[0], None) for x in args if x.t[0]])
+        return self.linear([(ONE, x.t[0], None) for x in args if x.t[0]], "multiples")
 
     def negated(self, x: Scalar) -> Tangents:
-        return self.linear([("-1.0", x.t[0], None)] if x.t[0] else [])
+        return self.linear([("-1.0", x.t[0], None)] if x.t[0] else [], "multiples")
 
-    def linear(self, edges: Sequence[tuple[str, str | None, str | None]], kept: bool = True) -> Tangents:
+    def linear(self, edges: Sequence[tuple[str, str | None, str | None]], kind: str) -> Tangents:
         if not edges:
             return self.none, self.none
         text = ", ".join(f"({slope}, {tangent}, {off})" for slope, tangent, off in edges)
-        return (self.let(f"{self.ufunc('tape.multiples' if kept else 'tape.linear')}({text})", "t"),), self.none
+        return (self.let(f"{self.ufunc('tape.' + kind)}({text})", "t"),), self.none

@@ -247,7 +247,7 @@ class _Run:
         directions = sum(size(name, value) for name, value in self.own(*wrt).items())
 
         def swept_back(value: Value, seeds: Sequence[Node]) -> Value:
-            if len(all_cells(value)) * SWEEP > directions:
+            if len(all_cells(value)) * SWEEP > max(directions, SWEEP):
                 raise Untaped
             return map_cells(value, lambda cell: Cell(cell.v, cell.e, *_swept([(cell, 1.0)], seeds)))
 
@@ -277,24 +277,40 @@ class _Run:
         own = self.own(*wrt)
         directions = sum(size(name, value) for name, value in own.items())
         shape = () if self.batch.shape is None else (max(1, int(np.prod(self.batch.shape))),)
-        if directions >= MANY and np.prod(shape) <= POINTS:  # a tape keeps arrays for all operations
-            seeds: list[Any] = []
-
-            def seeded(cell: Cell, places: tuple[int, ...]) -> Cell:
-                seeds.append(Node((), (*places, *shape)))
-                return Cell(cell.v, cell.e, (seeds[-1],))
-
-            moving = {name: with_places(value, (), seeded) for name, value in own.items()}
-            self.whole = True
+        small = np.prod(shape) <= POINTS  # a tape keeps arrays for all operations
+        if directions >= MANY and small:
             try:
-                found = self.evaluated(moving, self.machine.taped(), lambda value: swept_back(value, seeds))
-                return found if not self.machine.record.edges else self._with_sides(found, own, seeds, forward)
+                return self._taped(own, shape, swept_back, forward)
             except Untaped:
-                pass
-            self.machine, self.whole = self._machine(), False
+                self.machine, self.whole = self._machine(), False
         numbers = iter(range(directions))
         moving = {name: each_moving(value, numbers, directions) for name, value in own.items()}
-        return self.evaluated(moving, self.machine.with_directions(directions), forward)
+        found = self.evaluated(moving, self.machine.with_directions(directions), forward)
+        if directions == len(own) or directions >= MANY or not small or not _nowhere(found):
+            return found
+        # Elements that stand still where a slope is infinite: of infinity times 0 a tape knows nothing.
+        machine, self.machine = self.machine, self._machine()
+        try:
+            return self._taped(own, shape, swept_back, forward)
+        except Untaped:
+            self.machine, self.whole = machine, False
+            return found
+
+    def _taped(
+        self, own: dict[str, Value], shape: tuple[int, ...], swept_back: Callable[[Value, Sequence[Node]], Value],
+        forward: Callable[[Value], Value],
+    ) -> Value:  # fmt: skip
+        """The value with what its tape, swept back, has for each number. Raises Untaped."""
+        seeds: list[Any] = []
+
+        def seeded(cell: Cell, places: tuple[int, ...]) -> Cell:
+            seeds.append(Node((), (*places, *shape)))
+            return Cell(cell.v, cell.e, (seeds[-1],))
+
+        moving = {name: with_places(value, (), seeded) for name, value in own.items()}
+        self.whole = True
+        found = self.evaluated(moving, self.machine.taped(), lambda value: swept_back(value, seeds))
+        return found if not self.machine.record.edges else self._with_sides(found, own, seeds, forward)
 
     def _with_sides(
         self, found: Value, own: dict[str, Value], seeds: Sequence[Node], forward: Callable[[Value], Value]
@@ -362,6 +378,11 @@ def _swept(answers: Sequence[tuple[Cell, Any]], seeds: Sequence[Node]) -> tuple[
     nodes: list[tuple[Any, Any]] = [(cell.t[0], weight) for cell, weight in answers]
     found = swept([(node, weight) for node, weight in nodes if isinstance(node, Node)])
     return tuple(found.get(seed, NOTHING)[0] for seed in seeds), tuple(found.get(seed, NOTHING)[1] for seed in seeds)
+
+
+def _nowhere(value: Value) -> bool:
+    """Whether a number has derivatives that are none."""
+    return any(np.any(np.isfinite(cell.v) & np.isnan(x)) for cell in all_cells(value) for x in cell.t if x is not None)
 
 
 def _plain(found: Estimate) -> Estimate:

@@ -179,3 +179,31 @@ def test_hessians_of_sums() -> None:
 def test_two_answers_by_an_array() -> None:
     found = potto.grad(potto.compile(SUMS).powers)(p := np.linspace(0.2, 0.9, 30))
     within(found.tangent, found.tangent_error, np.stack([2 * p, 3 * p**2], axis=-1))
+
+
+ROOTS = """
+def roots(x: [n] Real) sum k in 0..n-1 (sqrt(x[k]))
+def weighted(x: [n] Real) sum k in 0..n-1 (k*sqrt(x[k]) + x[k])
+def squared(x: [n] Real) sum k in 0..n-1 (sqrt(x[k])^2)
+def kinked(x: [n] Real) sum k in 0..n-1 (sqrt(x[k]^2))
+"""
+
+
+@pytest.mark.parametrize("count", [3, 20])
+def test_elements_where_a_slope_is_infinite(count: int) -> None:
+    """What is at 0 takes no other's derivative along, by few parameters or many; a factor of 0 leaves it out."""
+    m, x = potto.compile(ROOTS), np.arange(float(count))
+    found = potto.grad(m.roots)(x)
+    assert found.tangent[0] == np.inf and not found.converged
+    within(found.tangent[1:], found.tangent_error[1:], 0.5 / np.sqrt(x[1:]))
+    found = potto.grad(m.weighted)(x)
+    within(found.tangent, found.tangent_error, 0.5 * np.sqrt(x) + 1)  # k = x[k]
+
+
+@pytest.mark.parametrize("count", [3, 20])
+@pytest.mark.parametrize("name", ["squared", "kinked"])
+def test_what_an_infinite_slope_makes_of_0_is_not_known(name: str, count: int) -> None:
+    """sqrt(x)^2 has the slope 0 by its root, and that by x is infinite: their product is 1, and neither tells it."""
+    found = potto.grad(getattr(potto.compile(ROOTS), name))(np.arange(float(count)))
+    assert np.isnan(found.tangent[0]) and np.isinf(found.tangent_error[0]) and not found.converged
+    within(found.tangent[1:], found.tangent_error[1:], np.ones(count - 1))

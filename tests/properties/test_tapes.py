@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from how_many import examples
 
-from potto.kernels.tape import Node, Untaped, leaves, linear, pushed, swept
+from potto.kernels.tape import Node, Untaped, leaves, linear, pushed, scaled, swept
 
 SIZE = 4
 
@@ -83,10 +83,16 @@ def test_what_is_pushed_forward_is_what_is_swept_back() -> None:
 
 
 def test_where_an_answer_does_not_depend_on_a_number_no_slope_is_too_steep() -> None:
+    """By a factor of 0 that does not move, or a member that is not taken; a slope that is 0 just here tells nothing."""
     x = Node((), ())
     steep = linear((float("inf"), x, None))
-    assert swept([(linear((0.0, steep, None)), 1.0)])[x][0] == 0.0
+    assert swept([(scaled((0.0, steep, None)), 1.0)])[x][0] == 0.0
     assert swept([(linear((1.0, steep, None)), 1.0)])[x][0] == float("inf")
+    by_zero, off = swept([(linear((0.0, steep, None)), 1.0)])[x]
+    assert np.isnan(by_zero) and off == float("inf")
+    rows = Node((), (2,))
+    some = np.where(np.array([True, False]), linear((np.array([1.0, np.inf]), rows, None)), 0.0)
+    assert swept([(np.add.reduce(some), 1.0)])[rows][0].tolist() == [1.0, 0.0]
 
 
 @pytest.mark.parametrize("what", [
