@@ -230,6 +230,7 @@ NOT_A_NUMBER = Shortfall(
     "look for a builtin that is used where it is not defined, and guard it with a condition",
 )
 INFINITE = Shortfall("the integral is infinite, or beyond what numbers can hold", POLE)
+BOUNDLESS = Shortfall("the value is infinite here", "move a parameter a little: beside this place it is finite")
 STEEP = Shortfall("the derivative is infinite here", "move a parameter a little: beside this place it is finite")
 NO_BOUND = Shortfall("the error is not known")
 UNBOUNDED_SAMPLES = Shortfall(

@@ -17,7 +17,7 @@ from potto.calculus.surfaces.discontinuities import TooDeep
 from potto.core.printer import abridged, format_term
 from potto.core.terms import Data, Integral, Sum, Term
 from potto.diagnostics import PottoError, Related
-from potto.integrate.events import INFINITE, NO_VALUE, NOT_A_NUMBER, ROUGH, Shortfall
+from potto.integrate.events import BOUNDLESS, INFINITE, NO_VALUE, NOT_A_NUMBER, ROUGH, STEEP, Shortfall
 from potto.kernels import errors
 from potto.kernels.cells import Cell, Number, Rows, Value, all_cells
 from potto.kernels.making import counts
@@ -218,7 +218,7 @@ def report(value: Value, machine: Machine, clock: Clock) -> Estimate:
         tangent_bounds = told(value, lambda cell: bar(cell.et[0]) if cell.t else None)
     shown = _flat(numbers, told(value, lambda cell: cell.e))  # nan of nan is another reason than inf of nan
     slopes = _slopes(value)
-    missing = _missing([*shown, *slopes], machine)
+    missing = _missing(shown, slopes, machine)
     merged(missing, steep([slope for slope, _ in slopes], missing))
     shape = np.broadcast_shapes(*(number.shape for number, _ in shown if isinstance(number, np.ndarray)))
     return answer(
@@ -266,17 +266,18 @@ def _slopes(value: Value) -> list[tuple[Any, Any]]:
     return [(number(t), number(bar(et))) for c in all_cells(value) for t, et in zip(c.t, c.et, strict=True)]
 
 
-def _missing(flat: list[tuple[Any, Any]], machine: Machine) -> Shortfalls:
+def _missing(numbers: list[tuple[Any, Any]], slopes: list[tuple[Any, Any]], machine: Machine) -> Shortfalls:
     """Why the numbers are not as accurate as was asked for: as was noted, and for other members by their errors."""
     record, settings = machine.record, machine.settings
     reasons = {**record.shortfalls, **{why: True for why, _ in machine.events.every(Shortfall)}}
     before = dict(reasons)
     drawn = not record.methods.isdisjoint(("mc", "qmc"))
-    for number, error in flat:
+    every = ((pair, why) for why, pairs in ((BOUNDLESS, numbers), (STEEP, slopes)) for pair in pairs)
+    for (number, error), infinite in every:
         found = missed(number, error, record.allowed, settings, drawn)
         if not found or any(where is True for where in before.values()):
             continue
-        found = _blamed(found, record.allowed.over(np.shape(number)).finite)
+        found = _blamed(found, record, np.shape(number), infinite)
         if found and any(rough(answer, settings.rtol, settings.atol) for answer in record.used.values()):
             found = {ROUGH: np.logical_or.reduce(list(found.values()))}
         told = converged_members(before, np.shape(number))
@@ -284,19 +285,25 @@ def _missing(flat: list[tuple[Any, Any]], machine: Machine) -> Shortfalls:
     return {why: where for why, where in reasons.items() if np.any(where)}
 
 
-def _blamed(found: Shortfalls, finite: Any) -> Shortfalls:
-    """Reasons without integrals that are to blame where all of them are finite: not of 1/0 and infinity times 0."""
-    out: Shortfalls = {}
-    for why, where in found.items():
-        if why not in (INFINITE, NO_VALUE):
-            merged(out, {why: where})
+def _blamed(found: Shortfalls, record: Record, shape: tuple[int, ...], infinite: Shortfall) -> Shortfalls:
+    """The reasons, in which no integral is to blame for 1/0, and infinity times 0, where all of them are finite.
+
+    infinite: what is said instead; nothing where there is no integral at all.
+    """
+    finite = record.allowed.over(shape).finite
+    others: Shortfalls = {}
+    for why, instead in ((INFINITE, infinite if record.methods else None), (NO_VALUE, NOT_A_NUMBER)):
+        if why not in found:
             continue
-        to_blame, others = np.logical_and(where, ~np.asarray(finite)), np.logical_and(where, finite)
-        if to_blame.any():
-            merged(out, {why: to_blame if np.ndim(where) else True})
-        if others.any() and why is NO_VALUE:
-            merged(out, {NOT_A_NUMBER: others if np.ndim(where) else True})
-    return out
+        where = found.pop(why)
+        for here, told in (
+            (np.logical_and(where, np.logical_not(finite)), why),
+            (np.logical_and(where, finite), instead),
+        ):
+            if told is not None and np.any(here):
+                merged(others, {told: here if np.ndim(where) else True})
+    merged(others, found)
+    return others
 
 
 def _as_named(term: Term, machine: Machine) -> Term:

@@ -14,6 +14,7 @@ import numpy as np
 from msgspec.structs import replace
 
 from potto.core.terms import App, Deriv, Global, If, Lam, Term, Var
+from potto.integrate.events import BOUNDLESS
 from potto.kernels.cells import Cell, Rows, Value
 from potto.runtime.answers.convergence import converged_members, steep
 from potto.runtime.answers.estimate import Estimate
@@ -186,8 +187,13 @@ def as_dual(estimate: Estimate) -> Estimate:
     if not missing:
         return dual
     every = estimate.member_converged
+    known = {
+        why: where
+        for why, where in estimate.shortfalls.items()
+        if why is not BOUNDLESS or any(np.any(np.isinf(number)) for number in _numbers(value))
+    }
     return replace(
-        dual, converged=False, shortfalls={**estimate.shortfalls, **missing},
+        dual, converged=False, shortfalls={**known, **missing},
         member_converged=None if every is None else every & converged_members(missing, np.shape(every)),
     )  # fmt: skip
 
