@@ -21,10 +21,12 @@ import numpy as np
 import pytest
 
 import potto
+from potto.calculus.surfaces.lifted import _Trees
 from potto.integrate.plan import make
 from potto.runtime.integration import problem
 
 EPS = 2.0**-52
+leaf = _Trees.leaf
 Map = tuple[Fraction, Fraction]  # gain and shift
 Piece = tuple[Fraction, Fraction, Fraction, Fraction]  # from, to, slope, offset
 H = Fraction(1, 10**15)
@@ -424,6 +426,27 @@ def test_samples_see_the_boundary(method: str) -> None:
     value, slope = float(thermostat(4, Fraction(0.5))), float(rate(lambda t: thermostat(4, t), 0.5))
     assert abs(answer.value - value) <= 2 * answer.error + 1e-12
     assert abs(answer.tangent - slope) <= 2 * answer.tangent_error + 1e-12
+
+
+@pytest.mark.parametrize("n", [20, 80])
+def test_many_thresholds_in_one_condition(n: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """There are n + 1 cases, but 2^n while nothing is known of thresholds: few leaves are looked at to find that out.
+
+    Between two thresholds (j - 1)*t/n and j*t/n there are n - j + 1 above.
+    """
+    looked = []
+    monkeypatch.setattr(_Trees, "leaf", lambda own, term: looked.append(term) or leaf(own, term))
+    below = " + ".join(f"{0.1 / n!r}*[x < {k / n!r}*t]" for k in range(1, n + 1))
+    answer = potto.deriv(potto.compile(f"def f(t) integral [0, 1] [x + {below} < t] d(x)").f)((0.5, 1.0))
+
+    def area(t: Fraction) -> Fraction:
+        ends = [Fraction(k / n) * t for k in range(n + 1)]
+        tops = [t - Fraction(0.1 / n) * (n - j) for j in range(n)]
+        return sum((max(min(b, top) - a, Fraction(0)) for a, b, top in zip(ends, ends[1:], tops, strict=False)), H * 0)
+
+    covered(answer, area(Fraction(0.5)))
+    covered(answer, rate(area, 0.5), tangent=True)
+    assert len(looked) <= 30 * n
 
 
 def test_too_many_cases_are_told() -> None:

@@ -222,6 +222,8 @@ class Polytope(Struct, eq=False):
                 d = other.slopes.get(name)
                 if d is None or not c.value * d.value < 0:
                     continue
+                if not self._below((form, abs(d.value)), (other, abs(c.value)), name):
+                    continue
                 mine, its = (d, c) if d.value > 0 else (_negative(d), _negative(c))
                 # mine > 0 > its: form * mine - other * its has no `name`
                 yield (
@@ -231,6 +233,23 @@ class Polytope(Struct, eq=False):
                         *_unless_number(neg(its.term)),
                     ),
                 )
+
+    def _below(self, first: tuple[AffineForm, float], second: tuple[AffineForm, float], name: str) -> bool:
+        """Whether the sum of two forms, each times a number, may be below 0 in the box, without `name`, which cancels.
+        By numbers alone: of most conditions nothing follows, and terms take a hundred times as long."""
+        (form, by), (other, its) = first, second
+        high = form.rest.value * by + other.rest.value * its
+        size = abs(high)
+        for slope in form.slopes.keys() | other.slopes.keys():
+            extent = self.box.get(slope)
+            if slope == name:
+                continue
+            if extent is None:
+                return False
+            c = form.slopes.get(slope, NONE).value * by + other.slopes.get(slope, NONE).value * its
+            part = max(c * extent.lo.value, c * extent.hi.value) if c else 0.0
+            high, size = high + part, max(size, abs(part))
+        return high < -0.5 * MARGIN * size
 
 
 def _opposite(form: AffineForm) -> AffineForm:

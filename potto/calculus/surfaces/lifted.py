@@ -49,6 +49,9 @@ from potto.core.terms import (
 )
 
 MOST_CASES = 400  # decisions of one tree; what is beyond it is not taken apart
+# How many leaves are looked at for each decision that there may be, where no side is left out: with numbers there are
+# fewer, so that no time is lost on many of them that come to the same.
+LOOKS = 4
 
 
 class TooManyCases(Exception):
@@ -96,7 +99,7 @@ def _of_integral(
     body = memo[term.body]
     if any(nested(c) for node in outside(body, (Integral,)) for c in coordinates_of(node)):
         brackets = sum(isinstance(node, Branch) for node in outside(body, (Integral,)))
-        trees = _Trees(body, forms, region, brackets if few else MOST_CASES)
+        trees = _Trees(body, forms, region, *((brackets, LOOKS * brackets) if few else (MOST_CASES, math.inf)))
         body = trees.apart(body)
         premises |= dict.fromkeys((*ordered, *trees.premises))
     return with_integrand(term, body)
@@ -125,12 +128,12 @@ Build = Callable[[tuple[Term, ...], Polytope], "Tree"]
 class _Trees:
     """The terms of one integrand as trees of the decisions that matter inside of conditions."""
 
-    def __init__(self, body: Term, forms: Forms, region: Polytope, most: int) -> None:
+    def __init__(self, body: Term, forms: Forms, region: Polytope, most: int, looks: float) -> None:
         self.forms = forms
         self.region = region
-        self.most = most
+        self.most, self.looks = most, looks
         self.premises: dict[Term, None] = {}
-        self.cases = 0  # of the tree that is being made
+        self.cases = self.looked = 0  # of the tree that is being made: decisions, and leaves that were looked at
         self.splits: dict[tuple[object, ...], Split] = {}
         self.leaves: dict[Term, BranchLeaf] = {}
         self.memo: dict[Term, Tree] = {}
@@ -162,7 +165,7 @@ class _Trees:
     def tree(self, root: Term) -> Tree:
         for node in postorder_by(root, self.below):
             if node not in self.memo:
-                self.cases = 0
+                self.cases = self.looked = 0
                 self.memo[node] = self.of(node)
         return self.memo[root]
 
@@ -198,6 +201,9 @@ class _Trees:
         """What `build` makes of the leaves that several trees have in common, in each part of a region."""
         first = next((tree for tree in trees if isinstance(tree, Split)), None)
         if first is None:
+            self.looked += 1
+            if self.looked > self.looks:
+                raise TooManyCases
             return build(tuple(tree.term for tree in trees if isinstance(tree, BranchLeaf)), region)
         sides: list[Tree | None] = []
         for up in (True, False):
