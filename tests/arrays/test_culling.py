@@ -105,7 +105,7 @@ HEAD = "def part(a, b, p) integral [p, p + 0.1] [a < x and x < a + 0.1]*b d(x)\n
 
 
 @pytest.mark.parametrize("name", SCENES)
-@settings(max_examples=examples(4))
+@settings(max_examples=examples(4, 200))  # one is 600 pairs three times with all of them, a second for the discs
 @given(seed=st.integers(0, 10_000))
 def test_what_is_left_out_is_nothing(name: str, seed: int) -> None:
     """The same sums with every pair evaluated: values, derivatives by elements and by the place of the pixel."""
