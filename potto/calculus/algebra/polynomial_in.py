@@ -145,6 +145,8 @@ def _join(first: Monomial, second: Monomial) -> Monomial:
 
 
 def _power(item: Parts, degree: Fraction) -> Parts | None:
+    if degree == 0:
+        return {(): [ONE]}
     if len(item) == 1:
         ((monomial, cs),) = item.items()
         whole = degree.denominator == 1

@@ -222,7 +222,8 @@ def _table(node: Sum) -> Lattice | None:
         rise = _beside(other, "between")
         inner = apply("clamp", cell, ZERO, last)
         part = mul(rise(inner), div(sub(place, end(1, inner)), sub(end(2, inner), end(1, inner))))
-        return add(_behind(rise, cell, behind), if_(prim("eq", cell, inner), part, ZERO))
+        walked = if_(prim("lt", cell, ZERO), ZERO, if_(prim("le", cell, last), part, ZERO))
+        return add(_behind(rise, cell, behind), walked)
 
     return way.args[0], cells, border, behind, look
 

@@ -54,12 +54,19 @@ def enclosable(term: Term, jumps: bool = False) -> bool:
 def _parts(node: Term) -> Sequence[Term]:
     """What is asked for an enclosure; an array that has a definition of its own is read beside the integral."""
     match node:
-        case Index(array=Global(), index=place):
+        case Index(array=array, index=place) if _defined(array):
             return (place,)
-        case Length(array=Global()):
+        case Length(array=array) if _defined(array):
             return ()
         case _:
             return value_parts(node)
+
+
+def _defined(array: Term) -> bool:
+    """Whether an array is a definition, or a part of one, as a column of a table is."""
+    while isinstance(array, Proj):
+        array = array.term
+    return isinstance(array, Global)
 
 
 @lru_cache(maxsize=4096)

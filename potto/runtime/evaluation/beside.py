@@ -85,7 +85,13 @@ def moved(value: Value, step: float | Array, d: int) -> Value:
 
     def after(cell: Cell) -> Cell:
         t = cell.t[d] if d < len(cell.t) else None
-        return cell if t is None else Cell(cell.v + step * t, cell.e, cell.t, cell.et)
+        if t is None:
+            return cell
+        way = step * t
+        v = cell.v
+        if 0 < np.ndim(v) < np.ndim(way):  # the numbers of an array that move as members of a batch do
+            v = np.reshape(v, np.shape(v) + (1,) * (np.ndim(way) - np.ndim(v)))
+        return Cell(v + way, cell.e, cell.t, cell.et)
 
     return map_cells(value, after)
 

@@ -227,7 +227,7 @@ def _batch(given: Value) -> tuple[int, ...]:
 
 
 def _shapes(given: Value, inside: int) -> Iterator[tuple[int, ...]]:
-    """The shapes of numbers, without the last axes, those of the arrays that they are in."""
+    """The shapes of numbers, without the first axes, those of the arrays that they are in."""
     if isinstance(given, Rows):
         yield from _shapes(given.item, inside + 1)
     elif isinstance(given, tuple | list):
@@ -235,7 +235,7 @@ def _shapes(given: Value, inside: int) -> Iterator[tuple[int, ...]]:
             yield from _shapes(item, inside)
     elif isinstance(given, Cell):
         for shape in (np.shape(x) for x in (given.v, *given.t) if x is not None):
-            yield shape[: max(len(shape) - inside, 0)]
+            yield shape[inside:]
 
 
 def _numbers(value: Value, directions: int, batch: tuple[int, ...]) -> Parts:
