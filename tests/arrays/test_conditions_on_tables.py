@@ -103,6 +103,19 @@ def f(t, xs: [n] Real, ys: [n] Real) integral [xs[0], xs[n - 1]] [interp(xs, ys,
     assert np.all(np.abs(np.asarray(found.value) - exact) <= np.asarray(found.error) + 1e-13)
 
 
+def test_second_derivatives_through_a_picture() -> None:
+    """Between four pixels it is s*x*y: of the square 1 - A is (1 - q + q log q)/4 + (1 - q)/4 + 1/16, with q = t/s."""
+    module = potto.compile("""
+def f(t, s) integral ([0, 1], [0, 1]) [s*image([[0, 0], [0, 1]], u, v) < t] d(u, v)
+""")
+    t = 0.3
+    slope, bend = (1 - np.log(t)) / 4, -1 / (4 * t)
+    found = potto.hessian(module.f, ["t", "s"])(t, 1.0)
+    mixed = -slope - t * bend
+    assert found.value == pytest.approx(np.array([[bend, mixed], [mixed, 2 * t * slope + t * t * bend]]), rel=1e-9)
+    assert found.converged
+
+
 def test_a_second_derivative_at_a_place_of_the_table_does_not_exist() -> None:
     """There the first one jumps: from 0.6 to 4."""
     module = potto.compile("""

@@ -53,8 +53,10 @@ def middle(term: Sum) -> Term | None:
     factor = _factor(term, "tent")
     if factor is None:
         return None
-    found = substitute(factor.args[0], {term.variable: ZERO})
-    return found if sub(found, var(term.variable)) is factor.args[0] else None
+    place, found = var(term.variable), substitute(factor.args[0], {term.variable: ZERO})
+    if sub(found, place) is factor.args[0]:
+        return found
+    return neg(found) if add(place, found) is factor.args[0] else None  # it is even
 
 
 class LatticeWalk(Struct, frozen=True):
