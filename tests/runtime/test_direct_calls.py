@@ -16,6 +16,7 @@ import potto
 from potto.kernels.making import counts
 from potto.python.calls import Call
 from potto.runtime.evaluate import Program
+from potto.runtime.integration.problem import Problem
 
 BACKENDS = [
     "numpy",
@@ -225,6 +226,24 @@ def test_batches_go_straight_to_the_integral(monkeypatch: pytest.MonkeyPatch) ->
         assert np.allclose(found.value, np.expm1(t), rtol=1e-14, atol=0)  # closed form, to rounding
         assert bool(found.notes) == (t is on_bound)
     assert answered == [True] * 4  # of the first call nothing is known
+
+
+def test_members_have_the_plan_of_their_batch(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A plan that holds for a batch is not looked for again for each of its members."""
+    asked, own = [], Problem._plan
+
+    def counted(self: Problem) -> Any:
+        asked.append(self.batch)
+        return own(self)
+
+    slope = potto.grad(potto.compile(RENDERER).f, "c")
+    monkeypatch.setattr(Problem, "_plan", counted)
+    places = np.linspace(-0.8, -0.7, 8)
+    found = slope(places)
+    assert asked and asked.count(1) <= 1
+    for i, c in enumerate(places):
+        exact, rate = quad(c)
+        assert abs(found.value[i] - exact) <= found.error[i] and abs(found.tangent[i] - rate) <= found.tangent_error[i]
 
 
 @pytest.mark.parametrize("shape", [(0,), (0, 3)])

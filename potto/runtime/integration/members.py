@@ -55,10 +55,15 @@ class Whole:
     @property
     def sums(self) -> Sums:
         index, part = self.parts[0]
-        if len(self.parts) == 1 and (index.size == 1 or run_of(index) is not None):  # all of them, in order
-            return replace(part, gross=added_up(part))
-        order = np.argsort(np.concatenate([index for index, _ in self.parts]))
-        return Sums.joined([replace(part, gross=added_up(part)) for _, part in self.parts]).pick(order)
+        if len(self.parts) > 1 or (index.size > 1 and run_of(index) is None):  # else all of them, in order
+            order = np.argsort(np.concatenate([index for index, _ in self.parts]))
+            part = Sums.joined([_with_gross(part) for _, part in self.parts]).pick(order)
+        return replace(part, gross=added_up(part))
+
+
+def _with_gross(sums: Sums) -> Sums:
+    """Sums of which is known what is added up, at the least nothing: those that are joined have the same fields."""
+    return sums if sums.gross is not None else replace(sums, gross=np.zeros((2, sums.v.shape[-1])))
 
 
 def added_up(sums: Sums) -> Array:

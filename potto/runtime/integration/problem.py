@@ -165,7 +165,9 @@ class Problem:
             return float(a[index[0]]) if index.size == 1 else a[index]
 
         env = {name: map_arrays(value, part) for name, value in self.env.items()}
-        return self.changed(env=env, batch=index.size)
+        picked = self.changed(env=env, batch=index.size)
+        picked.__dict__["chosen"] = dict(self.chosen)  # what holds for a batch holds for its members
+        return picked
 
     def member(self, number: int) -> Problem:
         """The problem of one member by itself, apart."""
