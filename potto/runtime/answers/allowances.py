@@ -102,13 +102,21 @@ def left_by(term: Integral, sums: Sums, rtol: float, shape: tuple[int, ...]) -> 
     within = allowance(term, sums, rtol)
     if sums.v.size == 1:
         most = float(np.max(within))
-        kept = (sums.e <= most).all() and (sums.et <= most).all()
-        return Allowance(most, bool(kept), bool(np.isfinite(sums.v).all() and np.isfinite(sums.t).all()))
-    kept = (sums.e <= within).all(axis=0) & (sums.et <= within).all(axis=(0, 1))
-    finite = np.isfinite(sums.v).all(axis=0) & np.isfinite(sums.t).all(axis=(0, 1))
+        exact = bool((sums.e <= most).all() and (sums.et <= most).all())
+        return Allowance(most, exact, bool(np.isfinite(sums.v).all() and np.isfinite(sums.t).all()))
+    kept: Bools = _everywhere(sums.e <= within) & _everywhere(sums.et <= within)
+    finite: Bools = np.ones(kept.shape, dtype=bool)
+    if not math.isfinite(np.add.reduce(sums.v, None) + np.add.reduce(sums.t, None)):  # seldom, in large batches
+        finite = _everywhere(np.isfinite(sums.v)) & _everywhere(np.isfinite(sums.t))
     if shape:
         return Allowance(*(part.reshape(shape) for part in (within, kept, finite)))
     return Allowance(float(np.max(within)), bool(kept.all()), bool(finite.all()))
+
+
+def _everywhere(holds: Bools) -> Bools:
+    """Per member of a batch, (B,), whether all of something holds, (..., B)."""
+    rows = holds.reshape(-1, holds.shape[-1])
+    return rows[0] if len(rows) == 1 else np.logical_and.reduce(rows, axis=0)  # type: ignore[no-any-return]
 
 
 @lru_cache(maxsize=4096)

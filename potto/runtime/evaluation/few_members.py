@@ -8,6 +8,7 @@ value.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from functools import reduce
 
@@ -36,12 +37,15 @@ Found = Callable[[Machine, Mapping[str, Value]], Value]
 def told_alone(value: Value, machine: Machine, env: Mapping[str, Value], found: Found) -> Value:
     """The value over a batch, in which members are as they are alone of which something is a number, and something else
     not known. Integrals see to their members themselves."""
-    shape = np.broadcast_shapes(*(a.shape for own in env.values() for a in all_arrays(own)))
-    if len(shape) != 1 or machine.taping or machine.record.methods or not _plain(value):
+    if machine.taping or machine.record.methods or not env or not _plain(value):
         return value
     cells = all_cells(value)
     parts = [part for cell in cells for part in (cell.v, cell.e, *cell.t, *cell.et) if part is not None]
-    if all(np.isfinite(np.sum(part)) for part in parts):
+    # a sum tells it in a third of the time of a look at each
+    if all(math.isfinite(part if np.ndim(part) == 0 else np.add.reduce(part, None)) for part in parts):
+        return value
+    shape = np.broadcast_shapes(*(a.shape for own in env.values() for a in all_arrays(own)))
+    if len(shape) != 1:
         return value
     known, number = (
         reduce(both, (np.isfinite(part) for part in some))
