@@ -39,17 +39,18 @@ ROUNDED = 1e-12
 
 
 def by_shapes(
-    plan: StraightIntegral, degrees: Sequence[int | None], machine: Evaluator, env: dict[str, Value], batch: int
-) -> tuple[Bools, Sums] | None:
+    plan: StraightIntegral, degrees: Sequence[int | None], machine: Evaluator, env: dict[str, Value], batch: int,
+    tight: bool,
+) -> tuple[Bools, Sums] | None:  # fmt: skip
     """Which members were integrated here, and the sums of all (zero for the others); None if none were: those for which
     cuts have the same formulas together.
 
-    degrees: of what is integrated over each variable, where it is a polynomial.
+    degrees: of what is integrated over each variable, where it is a polynomial. tight: whether all digits are wanted.
     """
     if machine.frozen or machine.side or not all(isinstance(env.get(name), Cell) for name in plan.names):
         return None
     if plan.choices is None:
-        return _of_one_form(plan, degrees, machine, env, batch)
+        return _of_one_form(plan, degrees, machine, env, batch, tight)
     done, sums = np.zeros(batch, dtype=bool), Sums.zeros(1, machine.directions, batch)
     names = plan.choices.params
     met = np.array([np.broadcast_to(cell.v, batch) for cell in
@@ -58,7 +59,7 @@ def by_shapes(
         here = np.flatnonzero(np.all([row == side for row, side in zip(met, sides, strict=True)], axis=0))
         own = plan.decided(sides) if here.size else plan
         part = env if here.size == batch else gather(env, here)
-        found = _of_one_form(own, degrees, machine, part, here.size) if here.size else None
+        found = _of_one_form(own, degrees, machine, part, here.size, tight) if here.size else None
         if found is not None:
             done[here] = found[0]
             sums = sums.with_members(here, found[1])
@@ -66,37 +67,10 @@ def by_shapes(
 
 
 def _of_one_form(
-    plan: StraightIntegral, degrees: Sequence[int | None], machine: Evaluator, env: dict[str, Value], batch: int
-) -> tuple[Bools, Sums] | None:
-    """The same where cuts of all have the same formulas."""
-    done, total = _added(plan, degrees, machine, env, batch, batch <= FEW)
-    if not done.any():
-        return None
-    fine = _fine(machine, env, total)
-    rough = np.flatnonzero(done & ~fine)
-    if batch > FEW and 0 < rough.size <= FEW:  # of few cells rounding is followed at all nodes, and known better
-        done[rough], again = _added(plan, degrees, machine, gather(env, rough), rough.size, False)
-        for whole, part in zip(total, again, strict=True):
-            whole[:, rough] = part
-        fine = _fine(machine, env, total)
-    done &= fine
-    if not done.any():
-        return None
-    number, truncated, rounding, gross = total
-    error = np.add(truncated, rounding, out=truncated)
-    added = np.stack((gross[0], gross[1:].max(axis=0, initial=0.0)))
-    if not done.all():
-        for part in (number, error, added):
-            part[:, ~done] = 0.0
-    return done, Sums(number[None, 0], error[None, 0], number[None, 1:], error[None, 1:], gross=added)
-
-
-def _added(
     plan: StraightIntegral, degrees: Sequence[int | None], machine: Evaluator, env: dict[str, Value], batch: int,
     tight: bool,
-) -> tuple[Bools, list[Array]]:  # fmt: skip
-    """Which members rules do for, and the integrals of these, what rules and rounding put them off, and what is added
-    up for them, (1 + k, batch) each."""
+) -> tuple[Bools, Sums] | None:  # fmt: skip
+    """The same where cuts of all have the same formulas."""
     here = {name: env[name] for name in plan.names}
     done = np.zeros(batch, dtype=bool)
     total = [np.zeros((1 + machine.directions, batch)) for _ in range(4)]
@@ -109,8 +83,19 @@ def _added(
             fine = _settled(plan, degrees, machine, some, cell, sums, tight)
             done[start + cell.members[~fine]] = False
             if batch == 1 and not done[0]:
-                return done, total
-    return done, total
+                return None
+    if not done.any():
+        return None
+    done &= _fine(machine, env, total)
+    if not done.any():
+        return None
+    number, truncated, rounding, gross = total
+    error = np.add(truncated, rounding, out=truncated)
+    added = np.stack((gross[0], gross[1:].max(axis=0, initial=0.0)))
+    if not done.all():
+        for part in (number, error, added):
+            part[:, ~done] = 0.0
+    return done, Sums(number[None, 0], error[None, 0], number[None, 1:], error[None, 1:], gross=added)
 
 
 def _fine(machine: Evaluator, env: dict[str, Value], total: Sequence[Array]) -> Bools:

@@ -323,7 +323,7 @@ class _Run(Struct, dict=True):
         plan, machine, env = self.plan, self.iteration.machine, point.env
         found = None
         if plan.line is not None and not (sides or self.iteration.still):
-            found = by_shapes(plan.line, plan.degrees[-1:], machine, env, n)
+            found = by_shapes(plan.line, plan.degrees[-1:], machine, env, n, False)
         done = np.zeros(n, dtype=bool) if found is None else found[0]
         rest = np.flatnonzero(~done)
         if found is not None and not rest.size:
