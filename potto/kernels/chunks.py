@@ -43,7 +43,6 @@ def many(args: list[Value], backend: str) -> bool:
 
 def at_points(kernel: Kernel, rt: Runtime, trace: Trace | None, args: list[Value], backend: str) -> Value:
     """The value of a kernel that works point by point: by machine code once that pays, by numpy until then."""
-    kept()
     parts: list[Any] = []  # runs with every kernel: no generators
     for arg in args:
         if arg.__class__ is not Cell:
@@ -73,6 +72,8 @@ def in_chunks(kernel: Kernel, rt: Runtime, trace: Trace | None, args: list[Value
             shape = np.broadcast_shapes(*(array.shape for array in arrays))
             break
     size = math.prod(shape)
+    if size > POINTS // 2:
+        kept()  # not for machine code: the one large array that it fills lies better where the system puts it
     if size <= POINTS:
         return kernel.run(rt, trace, *args)
     step = max(1, POINTS * shape[0] // size)
