@@ -16,7 +16,6 @@ from potto.calculus.surfaces.cancelled import without_cancelled
 from potto.calculus.surfaces.nested_brackets import has_nested
 from potto.core.terms import (
     Branch,
-    Index,
     Integral,
     Prim,
     Term,
@@ -150,7 +149,7 @@ def _outermost(surface: Term) -> list[Prim]:
     def chooses(node: Term) -> bool:
         return isinstance(node, Prim) and PRIMITIVES[node.op].cases is not None and bool(node.free)
 
-    order = postorder_by(surface, lambda node: () if chooses(node) else _below(node))
+    order = postorder_by(surface, lambda node: () if bound_names(node) or chooses(node) else children(node))
     return [node for node in order if isinstance(node, Prim) and chooses(node)]
 
 
@@ -203,12 +202,5 @@ def _apart(node: Term, most: int) -> Term:
 
 
 def _outside(surface: Term) -> list[Term]:
-    """The parts of a surface that are not inside an integral or a sum of it, whose variables mean nothing outside, nor
-    in an index, which is plain: with what it chooses no surface moves."""
-    return postorder_by(surface, _below)
-
-
-def _below(node: Term) -> tuple[Term, ...]:
-    if isinstance(node, Index):
-        return (node.array,)
-    return () if bound_names(node) else children(node)
+    """The parts of a surface that are not inside an integral or a sum of it, whose variables mean nothing outside."""
+    return postorder_by(surface, lambda node: () if bound_names(node) else children(node))
