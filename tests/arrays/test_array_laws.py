@@ -115,6 +115,22 @@ def test_every_index_at_every_bound(where: str) -> None:
     assert told.value.diagnostics[0].code in ("P0512", "P0507")  # of an index, or of the bound of a loop
 
 
+def test_what_is_read_several_times_counts_as_often() -> None:
+    """Slopes of rows that are read in one go, some of them more than once, add up: by hand, exactly."""
+    module = potto.compile("""
+def apart(m: [h, w] Real, ks: [n] Real) sum k in ks, j in 0..1 (m[k, j]^2*(1 + j))
+def rows(m: [h, w] Real, ks: [n] Real, t) sum k in ks (dot(m[k], m[0])*t)
+""")
+    m, ks, ts = np.arange(1.0, 17.0).reshape(8, 2), [0, 1, 1, 3, 3, 3, 7], np.array([1.0, 2.0])
+    by_elements, by_rows = np.zeros_like(m), np.zeros_like(m)
+    for k in ks:
+        by_elements[k] += 2 * m[k] * [1, 2]
+        by_rows[k] += m[0]
+        by_rows[0] += m[k]
+    assert np.array_equal(potto.grad(module.apart, "m")(m, ks).tangent, by_elements)
+    assert np.array_equal(potto.grad(module.rows, "m")(m, ks, ts).tangent, ts[:, None, None] * by_rows)
+
+
 # What is wrong with an element x, a place i, a variable u of integration and a number t.
 WRONG = [
     "if x*u < t then 1 else 0", "floor(x + u)", "q*x", "sin(x, t)", "if [u < x] then 1 else sin", "delta(u - x)^2",
