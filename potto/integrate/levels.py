@@ -11,16 +11,24 @@ from typing import Any
 
 from msgspec import Struct
 
-from potto.calculus.decomposition.surface_cuts import Cut
+from potto.calculus.algebra.affine import affine
+from potto.calculus.decomposition.surface_cuts import Cut, HalfPlanes
 from potto.calculus.decomposition.sweep import Level
 from potto.core.terms import Lam, Term, function_of, neg, prim, tuple_
 
 # What the places are that are no cuts, of which none has a number below 0: hints, and such with which no nodes move.
 HINT, RESTING = -1, -2
+NOTHING = function_of(tuple_(()))
+MANY_WALLS = 4  # from which on it is found out between which two of them something is integrated
 
 
 class LevelPlan(Struct, frozen=True, dict=True):
-    """One variable: its frame (bounds, then candidate cuts, as one tuple term) and what the cuts are."""
+    """One variable: its frame (bounds, then candidate cuts, as one tuple term) and what the cuts are.
+
+    corners: cuts that are corners of half planes, with what these are, three numbers each.
+    walls: rows of the frame, bounds not counted, beyond which nothing is integrated, on the side that the signs of
+    `slopes` tell: above those with a slope below 0, below the others.
+    """
 
     level: Level
     frame: Lam
@@ -30,6 +38,9 @@ class LevelPlan(Struct, frozen=True, dict=True):
     decided: tuple[int, ...]
     surfaces: Lam
     turned: tuple[tuple[int, ...], ...]
+    corners: tuple[tuple[int, Lam], ...] = ()
+    walls: tuple[int, ...] = ()
+    slopes: Lam = NOTHING
 
     @property
     def variable(self) -> str:
@@ -100,6 +111,7 @@ def level_plan(level: Level, decided: tuple[int, ...], groups: Sequence[Group]) 
         rows.extend((kind, False) for _ in places)
     deciding, turned = _deciding(decided, groups)
     surfaces = function_of(tuple_(deciding))
+    corners = tuple((number, _numbers_of(cut.corners)) for number, cut in enumerate(level.cuts) if cut.corners)
     return LevelPlan(
         level,
         function_of(tuple_(tuple(terms))),
@@ -109,7 +121,28 @@ def level_plan(level: Level, decided: tuple[int, ...], groups: Sequence[Group]) 
         decided,
         surfaces,
         turned,
+        corners,
+        *_walls(level, rows),
     )
+
+
+def _numbers_of(region: HalfPlanes) -> Lam:
+    return function_of(tuple_(tuple(number for plane in region.planes for number in plane)))
+
+
+def _walls(level: Level, rows: Sequence[tuple[int, bool]]) -> tuple[tuple[int, ...], Lam]:
+    """The rows beyond which nothing is integrated, and slopes of their surfaces towards the side where something is."""
+    walls: list[int] = []
+    slopes: list[Term] = []
+    for row, (number, _) in enumerate(rows):
+        cut = level.cuts[number] if number >= 0 else None
+        if cut is None or not cut.holds or cut.product is not None or len(cut.roots or ()) != 1 or cut.families:
+            continue
+        form = affine(cut.surface, (level.variable,))
+        if form is not None:
+            walls.append(row)
+            slopes.append(form.coefficients[0] if cut.holds > 0 else neg(form.coefficients[0]))
+    return (tuple(walls), function_of(tuple_(tuple(slopes)))) if len(walls) >= MANY_WALLS else ((), NOTHING)
 
 
 def _deciding(

@@ -6,7 +6,7 @@ bounds, cuts and sides stay as they are.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cached_property
 from typing import Any
 
@@ -15,7 +15,7 @@ from msgspec import Struct
 from potto.calculus.checking.solvability import monotone
 from potto.calculus.decomposition.critical import MOST_EQUATIONS, slopes_of
 from potto.calculus.decomposition.surface_cuts import along
-from potto.calculus.decomposition.sweep import sweep
+from potto.calculus.decomposition.sweep import Paths, sweep
 from potto.calculus.differentiation.level_sets import LevelSet
 from potto.calculus.solving.enclosable import slope_of
 from potto.calculus.surfaces.branch_assignment import box_of as extents
@@ -23,7 +23,7 @@ from potto.calculus.surfaces.case_split import by_extremes
 from potto.calculus.surfaces.discontinuities import Decide, Finding, Resolve
 from potto.core.packing import packed
 from potto.core.terms import Integral, Lam, Term, function_of, tuple_
-from potto.integrate.decomposition.vanishing import vanishing_of
+from potto.integrate.decomposition.vanishing import held, vanishing_of
 from potto.integrate.levels import Group, LevelPlan, group_levels
 
 NO_KINKS = function_of(tuple_(()))
@@ -93,7 +93,11 @@ def outlined(
 ) -> Outline:  # fmt: skip
     """The outline of an integral whose integrand has these surfaces; `findings` gives those of a bound. mixed: surfaces
     with conditions inside, as they were written: these may be decided in what is integrated."""
-    levels, groups = group_levels(sweep(term, found, resolve, decide, True, over).levels)
+
+    def holds(paths: Paths) -> Mapping[Term, int]:
+        return held(vanishing_of(term.body, paths, resolve=resolve))
+
+    levels, groups = group_levels(sweep(term, found, resolve, decide, True, over, holds).levels)
     numbers = {j.path: (g.number, j.orientation) for g in groups for j in g.cut.jumps}
     return Outline(
         term,

@@ -66,7 +66,7 @@ def test_an_octagon_costs_what_a_turned_one_does(a: float) -> None:
     edges = "*".join(f"[x*cos(a + {k}*pi/4) + y*sin(a + {k}*pi/4) < 0.7]" for k in range(8))
     f = potto.deriv(potto.compile(f"def f(a) integral ([-1, 1], [-1, 1]) {edges} d(x, y)").f)
     along, turned = f((a, 1.0)), f((0.3, 1.0))
-    assert along.evals <= 1.5 * turned.evals
+    assert turned.evals <= 50 and along.evals <= turned.evals + 50  # what is looked at beside four edges
     assert abs(along.value - 8 * 0.49 * math.tan(math.pi / 8)) <= along.error + 1e-15
     assert abs(along.tangent) <= along.tangent_error <= 1e-10 and along.converged
 

@@ -6,6 +6,7 @@ Evaluations of integrands are counted, and calls of functions, Python's and nump
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -48,6 +49,13 @@ def triangles(n: int) -> tuple[str, dict[str, float]]:
     return f"{tri}\ndef f({', '.join(at)}) integral ([0, 1], [0, 1]) ({calls}) d(x, y)", at
 
 
+def polygon(n: int) -> tuple[str, dict[str, float]]:
+    """A regular one, which no edge runs along an axis of."""
+    normals = ((math.cos(angle), math.sin(angle)) for angle in (2 * math.pi * (k + 0.3) / n for k in range(n)))
+    sides = "*".join(f"[({a!r})*x + ({b!r})*y < t]" for a, b in normals)
+    return f"def f(t) integral ([-2, 2], [-2, 2]) {sides} d(x, y)", {"t": 0.7}
+
+
 def builtins(n: int) -> tuple[str, dict[str, float]]:
     terms = " + ".join(f"sin({k}/{n}*x*t)*exp(-{k}/{n}*x)" for k in range(1, n + 1))
     return f"def f(t) integral [0, 1] ({terms})*[x < t] d(x)", {"t": 0.7}
@@ -60,7 +68,7 @@ def counted(call: Callable[[], Any]) -> tuple[int, int]:
 
 @pytest.mark.parametrize("made, sizes", [
     (conditions, (20, 40, 80)), (one_parameter, (160, 320, 640)), (own_parameters, (40, 80, 160)),
-    (triangles, (12, 24, 48)), (builtins, (80, 160, 320)),  # below, fewer nodes do
+    (triangles, (12, 24, 48)), (polygon, (16, 32, 64)), (builtins, (80, 160, 320)),  # below, fewer nodes do
 ])  # fmt: skip
 @pytest.mark.parametrize("gradient", [False, True])
 def test_twice_as_much(made: Made, sizes: tuple[int, ...], gradient: bool) -> None:

@@ -29,11 +29,16 @@ CONDITIONS: tuple[tuple[str, int, Truth], ...] = (
     ("{0} and {1} and {2}", 3, all),
     ("({0} or {1}) and {2}", 3, lambda s: (s[0] or s[1]) and s[2]),
 )
+MANY: tuple[tuple[str, int, Truth], ...] = (
+    (" and ".join(f"{{{k}}}" for k in range(8)), 8, all),
+    ("not (" + " or ".join(f"{{{k}}}" for k in range(7)) + ")", 7, lambda s: not any(s)),
+    ("({0} or {1}) and " + " and ".join(f"{{{k}}}" for k in range(2, 9)), 9, lambda s: (s[0] or s[1]) and all(s[2:])),
+)
 
 
-def scene(pick: random.Random) -> tuple[Scene, str, str]:
+def scene(pick: random.Random, conditions: tuple[tuple[str, int, Truth], ...]) -> tuple[Scene, str, str]:
     """A scene, its condition as Potto writes it, and how."""
-    text, count, truth = pick.choice(CONDITIONS)
+    text, count, truth = pick.choice(conditions)
     lines = tuple(_line(pick) for _ in range(count))
     if count > 1 and pick.random() < 0.3:  # the same line, flipped or scaled or turned by next to nothing
         first, scale = lines[0], pick.choice((1.0, -1.0, 2.0, -0.5))
@@ -88,10 +93,10 @@ def program(s: Scene, condition: str, spelling: str) -> str:
             return f"def f(t)\n    integral ({along[0]}, {along[1]}) {weight}*[{where}] d(x, y)"
 
 
-def check(number: int) -> str:
+def check(number: int, conditions: tuple[tuple[str, int, Truth], ...] = CONDITIONS) -> str:
     """Compare one program; what came of it."""
     pick = random.Random(number)
-    s, condition, spelling = scene(pick)
+    s, condition, spelling = scene(pick, conditions)
     t = pick.choice((0.0, 0.0, 0.0, 0.25, 1e-8, -1e-8, pick.uniform(-0.5, 0.5)))
     text = f"# program {number}\n{program(s, condition, spelling)}"
     return held_against(text, t, s.value(Fraction(t)), s.rate, pick.random() < 0.3)
@@ -102,6 +107,14 @@ def check(number: int) -> str:
 @given(st.integers(0, 10**9))
 def test_half_planes_in_awkward_places(number: int) -> None:
     check(number)
+
+
+@the_same(20262)
+@settings(max_examples=examples(40), deadline=None, suppress_health_check=list(HealthCheck))
+@given(st.integers(0, 10**9))
+def test_polygons_in_awkward_places(number: int) -> None:
+    """Of many half planes the corners of what they leave are found by clipping: what it drops must not count."""
+    check(number, MANY)
 
 
 def test_a_line_all_but_parallel_to_a_bound_that_moves_onto_it() -> None:

@@ -32,8 +32,11 @@ def further_systems(
     yield from shadows(systems[:MOST_PAIRS], variable, lo, hi, roots, searched)
 
 
-def shadows_of_cuts(cuts: tuple[Cut, ...], within: Within, further: frozenset[str]) -> Iterator[Shadow]:
-    """What the cuts of one variable leave in those further out."""
+def shadows_of_cuts(
+    cuts: Sequence[Cut], edges: Sequence[Cut], within: Within, further: frozenset[str]
+) -> Iterator[Shadow]:
+    """What the cuts of one variable leave in those further out. edges: further cuts, the sides of a polygon, whose
+    crossings with each other are its corners, which are looked for by themselves."""
     for cut in cuts:
         yield from _at_bounds(cut, within, False)
         yield from _turning(cut, within, further)
@@ -42,6 +45,8 @@ def shadows_of_cuts(cuts: tuple[Cut, ...], within: Within, further: frozenset[st
         for second in meeting:
             if first is not second and first.key.digest < second.key.digest:
                 yield from _crossings(first, second, within, further)
+        for edge in edges:
+            yield from _crossings(first, edge, within, further)
 
 
 def shadows_of_roots(

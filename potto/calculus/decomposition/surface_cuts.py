@@ -1,6 +1,6 @@
 """Surfaces as cuts of one variable: what they decide, what they are a product of, and where their roots are.
 
-Owns `Cut`, `WrittenSurface` and `Product`.
+Owns `Cut`, `WrittenSurface`, `Product` and `HalfPlanes`.
 """
 
 from __future__ import annotations
@@ -48,6 +48,8 @@ class Cut(Struct, frozen=True):
     turning: the integrand behaves like a square root there.
     roots: closed-form sections, or None where they are found by numbers.
     center: nothing happens at it but that a smooth integrand may be concentrated there.
+    holds: 1 or -1 where nothing is integrated but on that side of the canonical form, else 0.
+    corners: the half planes whose corners it stands for, instead of a surface.
     """
 
     surface: Term
@@ -59,6 +61,8 @@ class Cut(Struct, frozen=True):
     steps: bool = False
     product: Product | None = None
     center: bool = False
+    holds: int = 0
+    corners: HalfPlanes | None = None
 
     @property
     def decides(self) -> bool:
@@ -77,8 +81,17 @@ class Product(Struct, frozen=True):
     sign: int
 
 
+class HalfPlanes(Struct, frozen=True):
+    """An intersection of half planes a*x + b*y + c >= 0, x the variable that is cut, y the next one further in.
+
+    planes: a, b and c of each; the last two are those above the lower and below the upper bound of y.
+    """
+
+    planes: tuple[tuple[Term, Term, Term], ...]
+
+
 class Placed(Struct):
-    """A surface, what it is a product of (up to `sign`), and what is known of it."""
+    """A surface, what it is a product of (up to `sign`), and what is known of it. holds: as a cut has it."""
 
     face: WrittenSurface
     factors: tuple[WrittenSurface, ...]
@@ -86,6 +99,7 @@ class Placed(Struct):
     jumps: list[Jump] = []
     turning: bool = False
     steps: bool = False
+    holds: int = 0
 
 
 @lru_cache(maxsize=8192)
@@ -115,10 +129,10 @@ def cut_of(placed: Placed, variable: str) -> Cut:
     for part in here:
         found = _roots(part, variable)
         if found is None:
-            return Cut(surface, key, jumps, turning, None, (), steps, product)
+            return Cut(surface, key, jumps, turning, None, (), steps, product, holds=placed.holds)
         roots.update(dict.fromkeys((*found.roots, *found.poles)))
         families.update(dict.fromkeys((*found.families, *found.pole_families)))
-    return Cut(surface, key, jumps, turning, tuple(roots), tuple(families), steps, product)
+    return Cut(surface, key, jumps, turning, tuple(roots), tuple(families), steps, product, holds=placed.holds)
 
 
 def _roots(part: WrittenSurface, variable: str) -> Sections | None:

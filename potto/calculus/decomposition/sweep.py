@@ -8,17 +8,19 @@ decomposition in the manner of Collins, of the surfaces that a scene has, and of
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 
 from msgspec import Struct
 from msgspec.structs import replace
 
 from potto.calculus.algebra.rational_form import settled
 from potto.calculus.decomposition.critical import Critical, Within
+from potto.calculus.decomposition.half_planes import half_planes
 from potto.calculus.decomposition.projection import crossing, further_systems, shadows_of_cuts, shadows_of_roots
 from potto.calculus.decomposition.surface_cuts import (
     MOST_CENTERS,
     Cut,
+    HalfPlanes,
     Jump,
     Placed,
     along,
@@ -32,10 +34,13 @@ from potto.calculus.decomposition.surface_cuts import (
 from potto.calculus.differentiation.level_sets import LevelSet
 from potto.calculus.surfaces.case_split import by_extremes
 from potto.calculus.surfaces.discontinuities import Decide, Finding, Kind, Resolve, findings
-from potto.core.terms import Integral, Term, substitute
+from potto.core.terms import ZERO, Integral, Term, substitute
 
 MOST_EDGES = 24  # per variable, of densities further in, each of which has up to eight hints
 MOST_CUTS = 1200  # per variable; refinement doesn't see every weak kink that is left out
+Paths = Mapping[tuple[int, ...], tuple[Term, int]]
+# Of surfaces by the paths of their jumps, with orientations: 1 or -1 for those of which one side has to hold.
+Holds = Callable[[Paths], Mapping[Term, int]]
 
 
 class Level(Struct, frozen=True):
@@ -63,6 +68,7 @@ class _Pool(Struct):
     centers: dict[Term, None] = {}
     critical: dict[Critical, None] = {}
     edges: dict[Term, None] = {}
+    corners: list[HalfPlanes] = []
 
     def find(self, finding: Finding) -> None:
         if finding.critical is not None:
@@ -85,6 +91,12 @@ class _Pool(Struct):
             placed.jumps.append(Jump(jump[0], orientation, jump[1]))
         placed.turning |= turning
         placed.steps |= steps
+
+    def hold(self, holds: Holds) -> None:
+        """Note the sides outside of which nothing is integrated."""
+        paths = {j.path: (key, j.orientation) for key, placed in self.surfaces.items() for j in placed.jumps}
+        for key, side in holds(paths).items():
+            self.surfaces[key].holds = side
 
     def take(self, variable: str) -> list[Placed]:
         """The surfaces that vary along a variable. What is a factor of one and does not stays, as a step."""
@@ -131,15 +143,18 @@ class Sweep(Struct, frozen=True):
 
 def sweep(
     term: Integral, found: Iterable[Finding], resolve: Resolve, decide: Decide, outermost: bool = False,
-    over: LevelSet | None = None,
+    over: LevelSet | None = None, holds: Holds | None = None,
 ) -> Sweep:  # fmt: skip
     """Place every surface of an integral's body at the variable that it cuts. outermost: nobody asks for the rest.
 
-    over: the level set over which the innermost variable is not integrated but summed.
+    over: the level set over which the innermost variable is not integrated but summed. holds: the surfaces of which
+    nothing is integrated on one side.
     """
     pool = _Pool(term.variables)
     for finding in found:
         pool.find(finding)
+    if holds is not None and over is None:
+        pool.hold(holds)
     levels: list[Level] = []
     rows = list(zip(term.variables, term.bounds, term.hints, strict=True))
     for variable, bounds, hints in reversed(rows):
@@ -161,14 +176,16 @@ def _level(
     cuts = tuple(cut_of(placed, variable) for placed in pool.take(variable))
     decisive, others = [c for c in cuts if c.decides], [c for c in cuts if not c.decides]
     further = frozenset(pool.variables[: pool.variables.index(variable)])
-    complete = len(others) <= MOST_CUTS and crossing(cuts, variable, further)[1]
+    within = Within(variable, *bounds)
+    region, sides = half_planes(decisive, within, further)
+    alone = [cut for cut in decisive if cut not in sides]
+    complete = len(others) <= MOST_CUTS and crossing((*alone, *others), variable, further)[1]
     cuts = (*decisive, *others[:MOST_CUTS])
     (here, systems), edges = pool.take_points(variable), pool.take_edges(variable)
     own = None if over is None else cut_along(over.surface, variable)
     if not last:
-        within = Within(variable, *bounds)
         if over is None or own is None:
-            shadows = shadows_of_cuts(cuts, within, further)
+            shadows = shadows_of_cuts((*alone, *others[:MOST_CUTS]), sides, within, further)
         else:
             shadows = shadows_of_roots(own, cuts, within, further, len(over.shares) == 1)
         for shadow in shadows:
@@ -178,6 +195,10 @@ def _level(
                 pool.put(shadow[0], None, *shadow[1:])
         pool.critical.update(dict.fromkeys(further_systems(systems, cuts, variable, *bounds)))
         pool.edges.update(dict.fromkeys(_edges(decisive, variable, hints, further)))
+    else:
+        cuts = (*cuts, *(Cut(ZERO, ZERO, (), False, (), corners=corners) for corners in pool.corners))
+    if region is not None:
+        pool.corners.append(region)
     peaks = (*hints, *points_of(here, variable)[:MOST_CENTERS])
     placed = (*cuts, *around_centers(here, variable)) if own is None else (own,)
     return Level(variable, *bounds, peaks, placed, systems, complete, edges)

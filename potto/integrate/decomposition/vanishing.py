@@ -1,6 +1,6 @@
 """Where an integrand is exactly zero, told from the sides of its surfaces alone.
 
-Owns `vanishing_of`, which makes the test, and `vanishes`, which asks it.
+Owns `vanishing_of`, which makes the test, `vanishes`, which asks it, and `held`, the sides that it asks for.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from potto.core.terms import App, Branch, Const, If, Lam, ListOf, Prim, Proj, Te
 from potto.kernels.cells import Mask
 from potto.primitives import EXACT
 
-Numbers = Mapping[tuple[int, ...], tuple[int, int]]
+Numbers = Mapping[tuple[int, ...], tuple[Any, int]]  # groups, and orientations, by the paths of their branches
 
 
 def vanishing_of(body: Term, numbers: Numbers, part: Term | None = None, resolve: Resolve = lambda head: None) -> Any:
@@ -111,3 +111,18 @@ def vanishes(test: Any, sides: Mapping[int, Mask]) -> Any:
     for inner in test[2:]:
         result = result | vanishes(inner, sides) if test[0] == "or" else result & vanishes(inner, sides)
     return result
+
+
+def held(test: Any) -> dict[Any, int]:
+    """The groups of which one side has to hold, 1 or -1, where an integrand does not vanish."""
+    if isinstance(test, bool):
+        return {}
+    if test[0] == "or":
+        return {group: side for part in test[1:] for group, side in held(part).items()}
+    if test[0] == "and":
+        first, *rest = map(held, test[1:])
+        return {group: side for group, side in first.items() if all(other.get(group) == side for other in rest)}
+    _, group, orientation, then, orelse = test
+    if then is True:
+        return {**held(orelse), group: -orientation}
+    return {**held(then), group: orientation} if orelse is True else {}

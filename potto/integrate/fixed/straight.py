@@ -194,7 +194,7 @@ def _distinct(frame: Lam) -> tuple[dict[int, int], Lam]:
 
 
 def _not_plain(level: LevelPlan) -> bool:
-    return bool(level.found or any(level.turned)) or len(level.rows) > MOST_CUTS
+    return bool(level.found or level.corners or any(level.turned)) or len(level.rows) > MOST_CUTS
 
 
 def _all_sides(body: Term) -> Term:

@@ -1,0 +1,188 @@
+"""The corners of an intersection of half planes, and the edges of a range that is one of half lines.
+
+Owns `corner_rows` and `within_walls`. What is integrated is 0 outside of such a region, so that lines that cross there
+leave nothing: of n^2/2 crossings only the corners count, n at the most. Each line is clipped by all others (Cyrus and
+Beck 1978), which takes n^2 sums and products, and no formula. Whatever rounding does not settle counts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from msgspec import Struct
+from msgspec.structs import replace
+
+from potto.core.terms import Term
+from potto.integrate.columns import distinct, side_by_side
+from potto.integrate.decomposition.meetings import Row, as_array, tangents
+from potto.integrate.events import Unsearched
+from potto.integrate.levels import LevelPlan
+from potto.integrate.rules.gauss import EPS
+from potto.kernels.cells import Array, Cell, Ints, Value
+
+BESIDE = 2.0**-24  # of its size: how far outside of the region a place still counts
+ROUNDED = 2 * EPS  # of the sizes of its summands: how far off a sum of products is
+FINEST = 4 * EPS**2  # the same with what rounding took from each product
+SPLITS = 2.0**27 + 1
+CLEAR = 16 * EPS  # the same where lines are clipped
+MOST_NUMBERS = 1 << 18  # that are clipped at once
+
+
+class _Lines(Struct, frozen=True):
+    """Half planes a*x + b*y + c >= 0 of a batch, (3, n, B): numbers, how far off they are, and tangents (k, 3, n, B)
+    with errors. A line that is none for a member has nan for it all."""
+
+    v: Array
+    e: Array
+    t: Array
+    et: Array
+
+    def crossings(self, p: Ints, q: Ints, member: Ints) -> tuple[Array, Array, Array, Array]:
+        """Where lines p and q of members meet along x: places (P,), how far off, speeds (k, P), how far off these."""
+        below, off, speed, far = self.determinant(0, 1, p, q, member)
+        above, up, rise, wide = self.determinant(1, 2, p, q, member)
+        with np.errstate(all="ignore"):
+            x, size = above / below, np.abs(below)
+            e = (up + np.abs(x) * off) / size + EPS * np.abs(x)
+            t = (rise - x * speed) / below
+            et = (wide + np.abs(x) * far + e * np.abs(speed) + np.abs(t) * off) / size + EPS * np.abs(t)
+        return x, e, t, et
+
+    def determinant(self, i: int, j: int, p: Ints, q: Ints, member: Ints) -> tuple[Array, Array, Array, Array]:
+        """v[i, p]*v[j, q] - v[j, p]*v[i, q], how far off it is, its tangents, and how far off these are."""
+        (a, d), (c, b) = ([self.at(row, line, member) for line in (p, q)] for row in (i, j))
+        (one, rest), (other, more) = _product(a[0], b[0]), _product(c[0], d[0])
+        value = (one - other) + (rest - more)
+        off = EPS * np.abs(value) + FINEST * (np.abs(one) + np.abs(other)) + _doubt(a, b) + _doubt(c, d)
+        t = a[2] * b[0] + a[0] * b[2] - c[2] * d[0] - c[0] * d[2]
+        pairs = ((a, b), (b, a), (c, d), (d, c))
+        spread = sum((np.abs(x[2] * y[0]) for x, y in pairs), np.zeros_like(t))
+        far = sum((np.abs(x[2]) * y[1] + x[3] * np.abs(y[0]) for x, y in pairs), ROUNDED * spread)
+        return value, off, t, far
+
+    def at(self, row: int, line: Ints, member: Ints) -> tuple[Array, Array, Array, Array]:
+        """One number of some lines, how far off it is, its tangents, and how far off these are."""
+        return (self.v[row, line, member], self.e[row, line, member],
+                self.t[:, row, line, member], self.et[:, row, line, member])  # fmt: skip
+
+
+def _product(a: Array, b: Array) -> tuple[Array, Array]:
+    """A product, and what rounding has taken from it (Dekker 1971)."""
+    product = a * b
+    (high, low), (above, below) = _halves(a), _halves(b)
+    return product, low * below - (((product - high * above) - low * above) - high * below)
+
+
+def _halves(a: Array) -> tuple[Array, Array]:
+    """A number as the sum of two with half of its digits each (Veltkamp)."""
+    wide = SPLITS * a
+    high = wide - (wide - a)
+    return high, a - high
+
+
+def _doubt(a: Sequence[Array], b: Sequence[Array]) -> Array:
+    """How far off a product is by what its factors are."""
+    return a[1] * np.abs(b[0]) + b[1] * np.abs(a[0])
+
+
+def corner_rows(level: LevelPlan, env: dict[str, Value], batch: int, machine: Any) -> list[Row]:
+    """The cuts of one variable at corners of half planes."""
+    rows: list[Row] = []
+    for number, function in level.corners:
+        values = machine.tracking().evaluate(function, {n: env[n] for n in function.params}, None)
+        lines = _lines(values, batch, machine.directions)
+        unknown = ~np.isfinite(lines.v[:, :-2]).all(axis=(0, 1))
+        if unknown.any():
+            machine.note(Unsearched(level.variable), np.nonzero(unknown)[0])
+        first, second, owner = _corners(lines)
+        x, e, t, et = lines.crossings(first, second, owner)
+        order = np.lexsort((x, owner))
+        x, e, t, et = (side_by_side(owner[order], of[..., order], batch, gap)
+                       for of, gap in ((x, np.nan), (e, 0.0), (t, 0.0), (et, 0.0)))  # fmt: skip
+        rows += [Row(x[i], tuple(t[:, i]), number, False, e[i], tuple(et[:, i])) for i in range(x.shape[0])]
+    return rows
+
+
+def _lines(values: Value, batch: int, directions: int) -> _Lines:
+    """The half planes of a batch."""
+    assert isinstance(values, tuple)
+    cells = [cell for cell in values if isinstance(cell, Cell)]
+    v = np.stack([as_array(cell.v, batch) for cell in cells])
+    e = np.stack([as_array(0.0 if cell.e is None else np.abs(cell.e), batch) for cell in cells])
+    t = np.stack([tangents(cell.t, batch, directions) for cell in cells], axis=1)
+    et = np.abs(np.stack([tangents(cell.et, batch, directions) for cell in cells], axis=1))
+    v, e, t, et = (np.moveaxis(of.reshape(*of.shape[:-2], len(cells) // 3, 3, batch), -2, -3) for of in (v, e, t, et))
+    turned = np.where(v[2, -2] + v[2, -1] < 0, -1.0, 1.0)  # bounds that are reversed
+    for of in (v, t):
+        of[..., -2:, :] = of[..., -2:, :] * turned
+    return _Lines(v, e, t, et)
+
+
+def _corners(lines: _Lines) -> tuple[Ints, Ints, Ints]:
+    """Which two lines meet where there may be a corner, and of which member."""
+    _, count, batch = lines.v.shape
+    with np.errstate(all="ignore"):
+        size = np.hypot(lines.v[0], lines.v[1])
+        step = max(1, MOST_NUMBERS // size.size)
+        parts = [_clipped(lines, size, np.arange(i, min(i + step, count - 2))) for i in range(0, count - 2, step)]
+    one, other, owner = (np.concatenate(of) for of in zip(*parts, strict=True))
+    pairs = distinct((np.minimum(one, other) * count + np.maximum(one, other)) * batch + owner)
+    return pairs // (count * batch), pairs // batch % count, pairs % batch
+
+
+def _clipped(lines: _Lines, size: Array, some: Ints) -> tuple[Ints, Ints, Ints]:
+    """Some lines, the others at which they may end in all half planes, and whose they are. size: of normals, (n, B)."""
+    v = lines.v / size
+    off = (lines.e / size).sum(axis=0)
+    a, b, c = v[:, some][:, :, None]
+    (one, rest), (other, more) = (_product(lines.v[0][some][:, None], lines.v[1]),
+                                  _product(lines.v[1][some][:, None], lines.v[0]))  # fmt: skip
+    along = ((one - other) + (rest - more)) / (size[some][:, None] * size)
+    at_foot = v[2] - c * (a * v[0] + b * v[1])  # of 0 on the line, from where the way along it is measured
+    turned = EPS * np.abs(along) + off + off[some][:, None]  # how far off the slope is, as the lines themselves are
+    doubt = CLEAR * (np.abs(v[2]) + np.abs(c)) + off + off[some][:, None]
+    none = ~np.isfinite(at_foot)
+    none[np.arange(some.size), some] = True
+    starts, stops = ~none & (along > turned), ~none & (along < -turned)
+    ends = [-(at_foot + x) / (along + y) for x in (-doubt, doubt) for y in (-turned, turned)]
+    least, most = np.minimum.reduce(ends), np.maximum.reduce(ends)
+    least, most = least - BESIDE * np.abs(least), most + BESIDE * np.abs(most)
+    low = np.where(starts, least, -np.inf).max(axis=1, keepdims=True)
+    high = np.where(stops, most, np.inf).min(axis=1, keepdims=True)
+    there = (starts | stops) & (most >= low) & (least <= high)
+    parallel = ~none & ~(starts | stops)  # as far as is known: nothing is at 0 nearer than this
+    near = np.maximum(np.abs(at_foot) - doubt, 0.0) / (np.abs(along) + turned)
+    there |= parallel & ((high >= near) | (low <= -near)) & (along != 0)
+    outside = parallel & (at_foot < 0) & (high < near) & (low > -near)
+    line, at, owner = np.nonzero(there & (low <= high) & ~outside.any(axis=1, keepdims=True))
+    return some[line], at, owner
+
+
+def within_walls(
+    level: LevelPlan, rows: list[Row], env: dict[str, Value], batch: int, machine: Any, face: Term | None
+) -> list[Row]:
+    """The cuts of a range outside of whose walls nothing is integrated, without those outside.
+
+    face: the surface, if any, that is no wall, since it is what is integrated over.
+    """
+    slopes = machine.with_directions(0).evaluate(level.slopes, {n: env[n] for n in level.slopes.params}, None)
+    least: Any = -np.inf
+    most: Any = np.inf
+    for row, slope in zip((rows[i] for i in level.walls), slopes, strict=True):
+        if level.level.cuts[row.cut].surface is face:
+            continue
+        with np.errstate(invalid="ignore"):
+            wide = BESIDE * np.abs(row.x) + (0.0 if row.e is None else row.e)
+            known = np.isfinite(row.x) & np.isfinite(wide)
+            least = np.where(known & (slope.v > 0), np.maximum(least, row.x - wide), least)
+            most = np.where(known & (slope.v < 0), np.minimum(most, row.x + wide), most)
+    found = list(rows)
+    for i in level.walls:
+        x = rows[i].x
+        beside = BESIDE * np.abs(x) + (0.0 if rows[i].e is None else rows[i].e)
+        beyond = (x + beside < least) | (x - beside > most)
+        if np.any(beyond):
+            found[i] = replace(rows[i], x=np.where(beyond, np.nan, as_array(x, batch)))
+    return found
