@@ -7,6 +7,7 @@ what the domain could hold; that goes for any scale.
 from __future__ import annotations
 
 import math
+from typing import Literal
 
 import mpmath as mp
 import numpy as np
@@ -36,6 +37,26 @@ def test_the_strip_between_two_lines(width: float) -> None:
         exact = mp.quad(lambda x: mp.exp(x) * mp.mpf(width), [0, 0.3])
         assert abs(answer.value - exact) <= answer.error <= 1e-16
     assert not answer.converged
+
+
+@pytest.mark.parametrize("many", [1, 3, 40, 300])
+@pytest.mark.parametrize("backend", ["numpy", "native"])
+def test_a_slope_that_rounding_makes_0(many: int, backend: Literal["numpy", "native"]) -> None:
+    """1 + 2^-53 - 1 is 0 in doubles: the root of 2^-53 x - 2^-54 is at 1/2, and nowhere to rounding."""
+    f = potto.compile("def f(a, b, c, p)\n    integral [-1, 1] [(a + b - c)*x + (p - 1/2) > 0] d(x)").f
+    here = np.arange(many) == many // 2
+    with potto.settings(backend=backend):
+        answer = f(1.0, np.where(here, 2.0**-53, 0.25), 1.0, np.where(here, 0.5 - 2.0**-54, 0.6))
+    truth = np.where(here, 0.5, 1.4)
+    assert (np.abs(answer.value - truth) <= answer.error).all()
+    assert (answer.error[~here] <= 1e-13).all()
+
+
+def test_a_slope_that_is_0_is_no_doubt() -> None:
+    f = potto.compile("def f(a, b) integral [-1, 1] [a*x + b > 0] d(x)").f
+    for b, length in ((1e-300, 2.0), (-1e-300, 0.0), (0.25, 2.0)):
+        answer = f(0.0, b)
+        assert answer.value == length and answer.error <= 2e-15 and answer.converged
 
 
 def test_a_surface_that_rounding_puts_on_the_bound() -> None:

@@ -29,6 +29,7 @@ from potto.integrate.degenerate.kinks import note_flat
 from potto.integrate.degenerate.narrow_panels import count_narrow
 from potto.integrate.degenerate.scene import IteratedVariable
 from potto.integrate.degenerate.undefined import lost_members, sides_at
+from potto.integrate.degenerate.unplaced import unplaced
 from potto.integrate.events import UNSEEN_MEETING, sides_hidden
 from potto.integrate.levels import LevelPlan
 from potto.integrate.panels.magnitude import Extent
@@ -115,9 +116,10 @@ class Iteration(Struct):
         self.count_events(scene, cuts, sums)
         if settled.doubtful and not self.plan.hides:
             count_narrow(scene, seg, settled.sides, settled.doubtful, sums)
-        if settled.unsure is not None and not number:  # single nodes of variables further out may lie on a surface
-            machine.note(sides_hidden(level.variable), work.below(settled.unsure))
-            sums.unknown(settled.unsure)
+        for hidden in (settled.unsure, cuts.unplaced) if not number else ():  # single nodes further in may lie so
+            if hidden is not None and hidden.size:
+                machine.note(sides_hidden(level.variable), work.below(hidden))
+                sums.unknown(hidden)
         if cuts.lost is not None:
             sums.e += cuts.lost
             sums.et += cuts.lost
@@ -193,6 +195,8 @@ class Iteration(Struct):
         if machine.side and machine.directions:
             rows = on_bounds(level, lo, hi, rows, batch, machine.directions, kin)
         cuts = segments(level, lo, hi, rows, batch, machine.directions, kin)
+        if kin is None and level.decided:
+            cuts.unplaced = unplaced(level, env, (lo, hi), rows, batch, machine)
         if not any(c.decides for c in level.level.cuts):
             cuts = at_rest(cuts) if self.resting(level, lo, hi, cuts.segments) else finite_speeds(cuts)
         cuts.lost = lost

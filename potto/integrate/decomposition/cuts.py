@@ -48,7 +48,8 @@ class Cuts(Struct):
     """The outcome for one variable: orientation (B,), segments, whether anything moves, edges.
 
     brushes: edges at which only something further in changes. folds: where roots of one surface are at one place.
-    slivers: what may lie between cuts that are taken for one. lost: the most that cuts left out may matter.
+    slivers: what may lie between cuts that are taken for one. lost: the most that cuts left out may matter. unplaced:
+    members of which a surface may have a root anywhere.
     conflict: cuts all but at one place move differently: harmless only where the integrand does not jump there.
     paired: cuts at one place, at which it should only bend, move as one: so does a surface that runs along what is
     further in, where it leaves the one bound and the other.
@@ -68,6 +69,7 @@ class Cuts(Struct):
     folds: list[FoldsHere] = []
     slivers: list[Sliver] = []
     lost: Array | None = None
+    unplaced: Ints | None = None
 
 
 def frame_rows(plan: LevelPlan, values: tuple[Value, ...]) -> tuple[Cell, Cell, list[Row]]:

@@ -109,8 +109,9 @@ class BoxText(RuleText):
         clear = [at.apply("and", at.apply("lt", size, at.number(float("inf"))), at.apply("gt", size, self.zero))
                  for size in self.sizes]  # fmt: skip
         known, sides = [], []
-        for least, most in self.corners(here):
+        for least, most, off in self.corners(here):
             near = at.apply("mul", at.number(NEAR), self.larger(least, most))
+            near = near if off is None else at.apply("add", near, off)
             sides.append((at.apply("gt", least, near), at.apply("lt", most, at.apply("neg", near))))
         for least, most, nowhere, _ in self.enclosed(here):
             sides.append((at.apply("gt", least, self.zero), at.apply("lt", most, self.zero)))
@@ -126,18 +127,25 @@ class BoxText(RuleText):
         at.store(state, self.state)
         return lit
 
-    def corners(self, here: Mapping[str, Symbol]) -> list[tuple[str, str]]:
-        """The least and the most of surfaces that are affine in each variable: they are at corners."""
-        found: list[tuple[str, str]] = []
+    def corners(self, here: Mapping[str, Symbol]) -> list[tuple[str, str, str | None]]:
+        """The least and the most of surfaces that are affine in each variable, which they are at corners, and how far
+        off they may be at any of these."""
+        found: list[tuple[str, str, str | None]] = []
         if not children(self.look.flat.body):
             return found
         for ends in itertools.product(*zip(self.low, self.high, strict=True)):
             corner = {x: Symbol(end, None, (), ()) for x, end in zip(self.plan.variables, ends, strict=True)}
-            cells = self.evaluated(self.look.flat, {**here, **corner}, self.machine.with_directions(0))
-            pairs = found or [(cell.v, cell.v) for cell in cells]
-            found = [(self.at.apply("min", least, cell.v), self.at.apply("max", most, cell.v))
-                     for (least, most), cell in zip(pairs, cells, strict=True)]  # fmt: skip
+            cells = self.evaluated(self.look.flat, {**here, **corner}, self.machine.with_directions(0).tracking())
+            before = found or [(cell.v, cell.v, cell.e) for cell in cells]
+            found = [
+                (self.at.apply("min", least, cell.v), self.at.apply("max", most, cell.v), self.greatest(off, cell.e))
+                for (least, most, off), cell in zip(before, cells, strict=True)
+            ]
         return found
+
+    def greatest(self, x: str | None, y: str | None) -> str | None:
+        """The greater of two errors; one that is missing is 0."""
+        return x if y is None or x == y else y if x is None else self.at.apply("max", x, y)
 
     def enclosed(self, here: Mapping[str, Symbol]) -> list[Names]:
         """Bounds of the other surfaces."""

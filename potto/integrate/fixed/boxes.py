@@ -256,11 +256,14 @@ def _at_corners(
     here = {name: still(env[name]) for name in function.params if name in env}
     for n, variable in enumerate(box.variables):
         here[variable] = Cell(np.stack([(low[n], high[n])[corner[n]] for corner in corners]))
-    values = machine.with_directions(0).evaluate(function, {name: here[name] for name in function.params}, None)
+    tracking = machine.with_directions(0).tracking()
+    values = tracking.evaluate(function, {name: here[name] for name in function.params}, None)
     assert isinstance(values, tuple)
     for value in values:
         assert isinstance(value, Cell)
         at = np.broadcast_to(value.v, (len(corners), low.shape[1]))
         least, most = at.min(axis=0), at.max(axis=0)
         near = NEAR * np.maximum(np.abs(least), np.abs(most))
+        if value.e is not None:
+            near += np.broadcast_to(value.e, at.shape).max(axis=0)
         yield np.asarray(least > near), np.asarray(most < -near)
