@@ -25,6 +25,7 @@ from potto.integrate.fixed.on_bounds import OnBounds, Place, Tied
 from potto.integrate.fixed.regions import LOOSEST, Path, Places, known, region_of, settle
 from potto.integrate.fixed.settled import SettledRegion, accurate
 from potto.integrate.fixed.straight import CLEAR, StraightIntegral, nothing
+from potto.integrate.fixed.sum_text import RepeatedSum
 from potto.integrate.pieces import Evaluator, Sums
 from potto.integrate.rules.proved_orders import FrameCell as Stretch
 from potto.integrate.rules.proved_orders import Region
@@ -276,7 +277,8 @@ def settled(plan: StraightIntegral, machine: Evaluator, env: dict[str, Value]) -
     if awaited is not None and awaited.due:
         return None
     truncation = _truncation(plan, region, machine.directions, env)
-    return SettledRegion.of(plan, region, machine, found.box, truncation, faces, awaited)
+    sums = RepeatedSum.of(plan, region, machine, env)
+    return SettledRegion.of(plan, region, machine, found.box, truncation, faces, awaited, sums)
 
 
 def _decided(

@@ -2,14 +2,13 @@
 
 Owns `SettledRegion`, and `accurate`. Which parameters are read, where they lie, what the function of machine code is
 told, how many cells there are and how many tangents, is the same at every call: where there is machine code, what is
-left around it is written out once, as a text with these numbers in it. To go through lists of them takes as long again
-as the nodes do.
+left around it is written out once, as a text with these numbers in it; where there is none, all that numpy does is
+(`sum_text`), as soon as that pays. To find all this out again takes as long as the nodes do.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import nullcontext
 from functools import lru_cache
 from types import CodeType
 from typing import Any
@@ -20,6 +19,7 @@ from msgspec import Struct
 from potto.integrate.fixed.alone import LEFT, RegionPart
 from potto.integrate.fixed.moving_sums import MovingTotals, evaluated, summed
 from potto.integrate.fixed.straight import StraightIntegral
+from potto.integrate.fixed.sum_text import RepeatedSum, SumText
 from potto.integrate.pieces import Evaluator
 from potto.integrate.rules.gauss import EPS
 from potto.integrate.rules.proved_orders import Region
@@ -36,12 +36,13 @@ Faces = Sequence[tuple[RegionPart, Loaded]]
 At = Callable[[dict[str, Any]], MovingTotals | None]
 
 
-class SettledRegion(Struct, frozen=True, eq=False):
+class SettledRegion(Struct, eq=False):
     """An integral all over a region of its parameters, which run along tangents that stay the same.
 
     machine: one that keeps track of rounding. box: per parameter, between which numbers. truncation: a bound of what
-    the rule leaves out, of the value and each tangent. straight: the function of machine code with what is around it;
-    None where numpy adds up: for good, or until the function that it stands in for, which is `awaited`, is due.
+    the rule leaves out, of the value and each tangent. sums: those that numpy adds up. straight: the function for the
+    region; None as long as these were not asked for often enough. awaited: the function of machine code for which numpy
+    stands in until it is due; None where it does for good.
     """
 
     plan: StraightIntegral
@@ -49,33 +50,48 @@ class SettledRegion(Struct, frozen=True, eq=False):
     machine: Evaluator
     box: tuple[tuple[str, float, float], ...]
     truncation: list[float]
+    sums: RepeatedSum
     straight: At | None
     awaited: Promotion | None
 
     @classmethod
     def of(
         cls, plan: StraightIntegral, region: Region, machine: Evaluator, box: Mapping[str, tuple[float, float]],
-        truncation: list[float], faces: Faces | None, awaited: Promotion | None,
+        truncation: list[float], faces: Faces | None, awaited: Promotion | None, sums: RepeatedSum,
     ) -> SettledRegion:  # fmt: skip
         """faces: integrands with their functions of machine code; none where numpy adds up."""
         places = tuple((name, low, high) for name, (low, high) in box.items())
-        straight = by_machine_code(places, faces, truncation, machine.rtol, machine.atol) if faces else None
-        return cls(plan, region, machine.tracking(), places, truncation, straight, awaited)
+        straight = by_machine_code(places, faces, truncation, machine) if faces else None
+        return cls(plan, region, machine.tracking(), places, truncation, sums, straight, awaited)
 
     def at(self, env: dict[str, Any]) -> MovingTotals | None:
         """The value and its tangents; None outside of the region, and where they are not accurate enough."""
-        if self.straight is not None:
-            return self.straight(env)
+        if self.awaited is None:
+            return self._added(env) if self.straight is None else self.straight(env)
+        if self.awaited.due:
+            return None
+        with self.awaited.by_numpy():
+            return self._added(env) if self.straight is None else self.straight(env)
+
+    def _added(self, env: dict[str, Any]) -> MovingTotals | None:
+        """What numpy adds up, by the function for the region once that pays."""
         for name, low, high in self.box:
             if not low <= env[name].v <= high:
                 return None
-        if self.awaited is not None and self.awaited.due:
-            return None
+        text = self.sums.text(lambda: self._text(env))
+        if text is not None:
+            self.straight = text.at_region(self.region, _limits(self.box, self.truncation, self.machine))
+            return self.straight(env)  # type: ignore[no-any-return]
         plan, machine = self.plan, self.machine
-        with np.errstate(all="ignore"), nullcontext() if self.awaited is None else self.awaited.by_numpy():
+        with np.errstate(all="ignore"):
             frame = evaluated(plan.frames[0], machine, env)
             found = summed(plan.variables, plan.frames, self.region, machine, env, frame)
         return None if found is None else accurate(found, self.truncation, machine.rtol, machine.atol)
+
+    @np.errstate(all="ignore")
+    def _text(self, env: Mapping[str, Any]) -> SumText:
+        after = _enough(len(self.truncation), "nodes")
+        return SumText.of(self.plan, self.region, self.machine, env, _inside(self.box), after)
 
 
 def accurate(found: MovingTotals, truncation: Sequence[float], rtol: float, atol: float) -> MovingTotals | None:
@@ -91,22 +107,35 @@ def accurate(found: MovingTotals, truncation: Sequence[float], rtol: float, atol
     return MovingTotals(found.number, errors, found.gross, found.nodes)
 
 
-def by_machine_code(box: Box, faces: Faces, truncation: Sequence[float], rtol: float, atol: float) -> At:
-    """What `SettledRegion.at` is where machine code adds up, and `accurate` says whether that is enough."""
+def by_machine_code(box: Box, faces: Faces, truncation: Sequence[float], machine: Evaluator) -> At:
+    """What `SettledRegion.at` is where machine code adds up."""
     k1, nodes = len(truncation), sum(part.nodes for part, _ in faces)
-    scope: dict[str, Any] = {
-        "MovingTotals": MovingTotals, "counts": counts, "half": 0.5 * rtol, "least": 0.5 * atol, "left": LEFT,
-        **{f"beyond{d}": bound for d, bound in enumerate(truncation)},
-    }  # fmt: skip
-    lines = []
-    for i, (name, low, high) in enumerate(box):
-        scope |= {f"low{i}": low, f"high{i}": high}
-        lines.append(f"if not low{i} <= env[{name!r}].v <= high{i}: return None")
+    scope = {"counts": counts, "left": LEFT, **_limits(box, truncation, machine)}
+    lines = _inside(box)
     for i, (part, function) in enumerate(faces):
         scope |= {f"idle{i}": part.idle, f"layout{i}": part.layout, f"call{i}": function.call, f"share{i}": part.share}
         lines += _of_face(part, i, k1)
-    lines.append(f"counts.native_points += {nodes}")
-    every = range(k1)
+    lines += [f"counts.native_points += {nodes}", *_enough(k1, f"{nodes}")]
+    exec(_compiled("def at(env):\n    " + "\n    ".join(lines) + "\n"), scope)
+    return scope["at"]  # type: ignore[no-any-return]
+
+
+def _limits(box: Box, truncation: Sequence[float], machine: Evaluator) -> dict[str, Any]:
+    """What `_inside` and `_enough` call by name."""
+    ends = {f"{end}{i}": place[at] for i, place in enumerate(box) for end, at in (("low", 1), ("high", 2))}
+    beyond = {f"beyond{d}": bound for d, bound in enumerate(truncation)}
+    return {"MovingTotals": MovingTotals, "half": 0.5 * machine.rtol, "least": 0.5 * machine.atol, **ends, **beyond}
+
+
+def _inside(box: Box) -> list[str]:
+    """The lines that see to it that parameters are in the region."""
+    return [f"if not low{i} <= env[{name!r}].v <= high{i}: return None" for i, (name, _, _) in enumerate(box)]
+
+
+def _enough(k1: int, nodes: str) -> list[str]:
+    """The lines that end with the numbers n0 ..., their errors e0 ... and their sizes g0 ..., if these are what
+    `accurate` lets pass."""
+    lines, every = [], range(k1)
     for d in every:
         lines += [
             f"asked = half*abs(n{d})",
@@ -116,9 +145,7 @@ def by_machine_code(box: Box, faces: Faces, truncation: Sequence[float], rtol: f
         ]
     numbers, errors, gross = (", ".join(row) for row in zip(*((f"n{d}", f"e{d} + beyond{d}", f"g{d}") for d in every),
                                                             strict=True))  # fmt: skip
-    lines.append(f"return MovingTotals([{numbers}], [{errors}], [{gross}], {nodes})")
-    exec(_compiled("def at(env):\n    " + "\n    ".join(lines) + "\n"), scope)
-    return scope["at"]  # type: ignore[no-any-return]
+    return [*lines, f"return MovingTotals([{numbers}], [{errors}], [{gross}], {nodes})"]
 
 
 @lru_cache(maxsize=512)

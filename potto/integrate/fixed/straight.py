@@ -53,8 +53,9 @@ class StraightIntegral(Struct, frozen=True, dict=True, eq=False):
     rows where something is like a square root. shared: per variable the bounds that are cuts as well. surfaces: what
     the integrand's branches depend on, as one function to a tuple. names: parameters. regions: what was proved of the
     rules for cells in a region, None where nothing could be. settled: what is known where the cells are the same all
-    over; None where they are not. choices: what decides by the parameters alone which formulas cuts have, 1 or 0 each,
-    as for a quadratic's roots; such a plan is of no use before they are `decided`. held: how they were. plans: theirs.
+    over; None where they are not. texts: of sums that numpy adds up again and again. choices: what decides by the
+    parameters alone which formulas cuts have, 1 or 0 each, as for a quadratic's roots; such a plan is of no use before
+    they are `decided`. held: how they were. plans: theirs.
     """
 
     variables: tuple[str, ...]
@@ -70,6 +71,7 @@ class StraightIntegral(Struct, frozen=True, dict=True, eq=False):
     lowered: dict[Any, Any] = {}
     alone: dict[Any, Any] = {}
     settled: dict[Any, Any] = {}
+    texts: dict[Any, Any] = {}
     choices: Lam | None = None
     held: tuple[tuple[Term, bool], ...] = ()
     plans: dict[tuple[bool, ...], StraightIntegral] = {}
