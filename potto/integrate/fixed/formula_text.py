@@ -1,4 +1,4 @@
-"""Formulas of the parameters of many members, as LLVM reads them: eight members at a time.
+"""Formulas of the parameters of many members, as LLVM reads them: some members at a time.
 
 Owns `FormulaText`, on which the texts of product rules, of boxes and of topologies are built, and `ParameterPlace` and
 `Symbol`.
@@ -56,20 +56,20 @@ class FormulaText:
 
     reserved = 0
 
-    def __init__(self, machine: Evaluator) -> None:
-        self.machine, self.at = machine, Vectors()
+    def __init__(self, machine: Evaluator, lanes: int = LANES) -> None:
+        self.machine, self.at = machine, Vectors(lanes)
         self.k1 = 1 + machine.directions
         self.zero, self.one = self.at.number(0.0), self.at.number(1.0)
 
     # Members
 
     def block(self) -> None:
-        """Begin the loop over the members, eight at a time; the last ones are done twice."""
+        """Begin the loop over the members, some at a time; the last ones are done twice."""
         at = self.at
         self.count = at.address("%frame", 0)
-        last = at.whole("sub", self.count, LANES)
-        blocks = at.whole("udiv", at.whole("add", self.count, LANES - 1), LANES)
-        self.number = at.whole("mul", at.begin(blocks), LANES)
+        last = at.whole("sub", self.count, at.lanes)
+        blocks = at.whole("udiv", at.whole("add", self.count, at.lanes - 1), at.lanes)
+        self.number = at.whole("mul", at.begin(blocks), at.lanes)
         self.first = at.once(f"call i64 @llvm.umin.i64(i64 {self.number}, i64 {last})", self.number)
 
     def parameters(

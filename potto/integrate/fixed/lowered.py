@@ -40,7 +40,7 @@ LINES, LINES_OF_A_TERM = 400, 3
 class LoweredCells(Struct, frozen=True):
     """The rule for cells of one integrand with any number of nodes, for parameters with these parts.
 
-    told: whether coefficients tell what it leaves out; else that is known.
+    told: whether coefficients tell what it leaves out; else that is known. lanes: how many cells it does at a time.
     """
 
     plan: StraightIntegral
@@ -48,11 +48,14 @@ class LoweredCells(Struct, frozen=True):
     places: tuple[ParameterPlace, ...]
     told: bool
     promotion: Promotion
+    lanes: int = LANES
 
     def function(self, machine: Evaluator) -> Loaded | None:
         """The function, if it is to be used now."""
         kind = RuleText if self.told else MeanText
-        return self.promotion.function(machine.backend, lambda: kind(self.plan, self.face, machine).text(self.places))
+        return self.promotion.function(
+            machine.backend, lambda: kind(self.plan, self.face, machine, self.lanes).text(self.places)
+        )
 
     def run(
         self, function: Loaded, env: Mapping[str, Value], members: Ints, rows: RowNumbers, axes: Sequence[Axis],
@@ -63,7 +66,7 @@ class LoweredCells(Struct, frozen=True):
         numbers, arrays = given(self.places, env)
         ends = [row.astype(float) for pair in rows for row in pair]
         sizes = [self.rows(k1), *(axis.transform.shape[1] * k1 for axis in axes if self.told)]
-        out = np.empty((sum(sizes), max(count, LANES)))
+        out = np.empty((sum(sizes), max(count, self.lanes)))
         columns = [whole(column, out.shape[1]) for column in (members, *ends)]
         columns[1:1] = map(np.ascontiguousarray, arrays)
         frame = frame_of(out, axes, columns)
@@ -84,15 +87,16 @@ class LoweredCells(Struct, frozen=True):
 
 
 def lowered_cells(
-    plan: StraightIntegral, face: Term, directions: int, env: Mapping[str, Value], told: bool
-) -> LoweredCells:
+    plan: StraightIntegral, face: Term, directions: int, env: Mapping[str, Value], told: bool,
+    lanes: int = LANES,
+) -> LoweredCells:  # fmt: skip
     """The rule for an integrand on cells, in an environment whose numbers have these parts."""
     places = places_of(plan.names, env)
-    key = (face, directions, places, told)
+    key = (face, directions, places, told, lanes)
     found: LoweredCells | None = plan.lowered.get(key)
     if found is None:
         lines = LINES + LINES_OF_A_TERM * terms_of(plan, face) * (1 + directions)
-        found = plan.lowered[key] = LoweredCells(plan, face, places, told, Promotion(NAME, lines))
+        found = plan.lowered[key] = LoweredCells(plan, face, places, told, Promotion(NAME, lines), lanes)
     return found
 
 

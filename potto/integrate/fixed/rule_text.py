@@ -20,6 +20,7 @@ from potto.integrate.fixed.straight import StraightIntegral
 from potto.integrate.pieces import Evaluator
 from potto.integrate.rules.gauss import EPS
 from potto.kernels.native.elementary import module
+from potto.kernels.native.vectors import LANES
 
 NAME = "rule"
 # Numbers of the frame: how many members, how long the rows of results are, and where, how many ends of each stretch are
@@ -34,8 +35,8 @@ class RuleText(FormulaText):
     for every member, and the rows of the ends of cells.
     """
 
-    def __init__(self, plan: StraightIntegral, face: Term, machine: Evaluator) -> None:
-        super().__init__(machine)
+    def __init__(self, plan: StraightIntegral, face: Term, machine: Evaluator, lanes: int = LANES) -> None:
+        super().__init__(machine, lanes)
         self.plan = plan
         self.face, self.edges = function_of(face), [function_of(edge) for edge in edges_of(face)]
         self.channels = self.k1

@@ -1,4 +1,4 @@
-"""Elementary functions of eight numbers at a time: exp, log, sin, cos by polynomials, the others by the C library.
+"""Elementary functions of vectors: exp, log, sin, cos by polynomials, the others by the C library.
 
 Owns `module`. The four are within 0.78, 0.83, 0.78 and 0.77 units in the last place at three million places each
 (`benchmarks/calibration.py elementary`), and held to 1 by `tests/properties/test_machine_code.py`; the C library's are
@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping
 
-from potto.kernels.native.vectors import LANES, LIBRARY, MASK, NUMBER, WHOLE, Vectors, bits, intrinsics
+from potto.kernels.native.vectors import LIBRARY, Vectors, bits, intrinsics
 
 # Added to a number below 2^51, it leaves the nearest whole number in the last bits.
 MAGIC = 1.5 * 2.0**52
@@ -60,14 +60,14 @@ class _Writer(Vectors):
         return self.sub(moved, self.number(MAGIC)), self.integer(moved)
 
     def integer(self, x: str) -> str:
-        return self.once(f"bitcast {NUMBER} {x} to {WHOLE}", x)
+        return self.once(f"bitcast {self.doubles} {x} to {self.whole_numbers}", x)
 
     def real(self, x: str) -> str:
-        return self.once(f"bitcast {WHOLE} {x} to {NUMBER}", x)
+        return self.once(f"bitcast {self.whole_numbers} {x} to {self.doubles}", x)
 
     def whole_op(self, code: str, a: str, b: int | str) -> str:
         other = f"splat (i64 {b})" if isinstance(b, int) else b
-        return self.once(f"{code} {WHOLE} {a}, {other}", a, *([b] if isinstance(b, str) else []))
+        return self.once(f"{code} {self.whole_numbers} {a}, {other}", a, *([b] if isinstance(b, str) else []))
 
     def power_of_two(self, k: str) -> str:
         """2^k for a whole number in the last bits."""
@@ -147,7 +147,7 @@ def _quarters(turn: int) -> Callable[[_Writer, str], str]:
 
 def _bit(at: _Writer, x: str, bit: int) -> str:
     masked = at.whole_op("and", x, bit)
-    return at.once(f"icmp ne {WHOLE} {masked}, zeroinitializer", masked)
+    return at.once(f"icmp ne {at.whole_numbers} {masked}, zeroinitializer", masked)
 
 
 _OURS: Mapping[str, Callable[[_Writer, str], str]] = {
@@ -159,64 +159,66 @@ _NEAR_ONLY = ("sin", "cos")
 def module(at: Vectors, name: str, parameters: str) -> str:
     """A module with the function that lines are, and all that it calls."""
     (body,) = at.bodies
-    texts = [text for code in at.used for text in _function(code)]
+    texts = [text for code in at.used for text in _function(code, at)]
     if any("@gather(" in line for line in body):
-        texts.append(_gather())
+        texts.append(_gather(at))
     texts.append("\n".join([f"define void @{name}({parameters}) {{", "entry:", *body, "  ret void", "}"]))
     whole = "\n".join(texts)
-    return "\n".join([intrinsics(whole), whole, ""])
+    return "\n".join([intrinsics(whole, at), whole, ""])
 
 
-def _function(code: str) -> list[str]:
+def _function(code: str, at: Vectors) -> list[str]:
     arity = LIBRARY[code]
     declared = f"declare double @{code}({', '.join(['double'] * arity)}) nounwind memory(none)"
     if code not in _OURS:
-        return [declared, _one_by_one(code, f"each_{code}", arity)]
+        return [declared, _one_by_one(code, f"each_{code}", arity, at)]
     if code not in _NEAR_ONLY:
-        return [_ours(code, f"each_{code}")]
+        return [_ours(code, f"each_{code}", at.lanes)]
     far = (
-        f"define internal {NUMBER} @each_{code}({NUMBER} %x0) {{\n"
-        f"  %size = call {NUMBER} @llvm.fabs.v{LANES}f64({NUMBER} %x0)\n"
-        f"  %far = fcmp uge {NUMBER} %size, splat (double {bits(FAR)})\n"
-        f"  %any = call i1 @llvm.vector.reduce.or.v{LANES}i1({MASK} %far)\n"
+        f"define internal {at.doubles} @each_{code}({at.doubles} %x0) {{\n"
+        f"  %size = call {at.doubles} @llvm.fabs.v{at.lanes}f64({at.doubles} %x0)\n"
+        f"  %far = fcmp uge {at.doubles} %size, splat (double {bits(FAR)})\n"
+        f"  %any = call i1 @llvm.vector.reduce.or.v{at.lanes}i1({at.masks} %far)\n"
         "  br i1 %any, label %one, label %all\n"
-        f"one:\n  %slow = call {NUMBER} @library_{code}({NUMBER} %x0)\n  ret {NUMBER} %slow\n"
-        f"all:\n  %fast = call {NUMBER} @near_{code}({NUMBER} %x0)\n  ret {NUMBER} %fast\n}}"
+        f"one:\n  %slow = call {at.doubles} @library_{code}({at.doubles} %x0)\n  ret {at.doubles} %slow\n"
+        f"all:\n  %fast = call {at.doubles} @near_{code}({at.doubles} %x0)\n  ret {at.doubles} %fast\n}}"
     )
-    return [declared, _one_by_one(code, f"library_{code}", 1), _ours(code, f"near_{code}"), far]
+    return [declared, _one_by_one(code, f"library_{code}", 1, at), _ours(code, f"near_{code}", at.lanes), far]
 
 
-def _gather() -> str:
+def _gather(at: Vectors) -> str:
     lines, found = [], "poison"
-    for i in range(LANES):
+    for i in range(at.lanes):
         lines += [
-            f"  %i{i} = extractelement {WHOLE} %index, i64 {i}",
+            f"  %i{i} = extractelement {at.whole_numbers} %index, i64 {i}",
             f"  %p{i} = getelementptr double, ptr %memory, i64 %i{i}",
             f"  %x{i} = load double, ptr %p{i}, align 8",
-            f"  %v{i} = insertelement {NUMBER} {found}, double %x{i}, i64 {i}",
+            f"  %v{i} = insertelement {at.doubles} {found}, double %x{i}, i64 {i}",
         ]
         found = f"%v{i}"
-    head = f"define internal {NUMBER} @gather(ptr %memory, {WHOLE} %index) {{"
-    return "\n".join([head, *lines, f"  ret {NUMBER} {found}", "}"])
+    head = f"define internal {at.doubles} @gather(ptr %memory, {at.whole_numbers} %index) {{"
+    return "\n".join([head, *lines, f"  ret {at.doubles} {found}", "}"])
 
 
-def _ours(code: str, name: str) -> str:
-    at = _Writer()
+def _ours(code: str, name: str, lanes: int) -> str:
+    at = _Writer(lanes)
     result = _OURS[code](at, "%x0")
     (body,) = at.bodies
-    return "\n".join([f"define internal {NUMBER} @{name}({NUMBER} %x0) {{", *body, f"  ret {NUMBER} {result}", "}"])
+    return "\n".join(
+        [f"define internal {at.doubles} @{name}({at.doubles} %x0) {{", *body, f"  ret {at.doubles} {result}", "}"]
+    )
 
 
-def _one_by_one(code: str, name: str, arity: int) -> str:
+def _one_by_one(code: str, name: str, arity: int, at: Vectors) -> str:
     """A function that calls that of the C library at each place."""
-    lines = [f"define internal {NUMBER} @{name}({', '.join(f'{NUMBER} %x{i}' for i in range(arity))}) {{"]
+    lines = [f"define internal {at.doubles} @{name}({', '.join(f'{at.doubles} %x{i}' for i in range(arity))}) {{"]
     result = "poison"
-    for lane in range(LANES):
+    for lane in range(at.lanes):
         given = []
         for i in range(arity):
-            lines.append(f"  %a{lane}_{i} = extractelement {NUMBER} %x{i}, i32 {lane}")
+            lines.append(f"  %a{lane}_{i} = extractelement {at.doubles} %x{i}, i32 {lane}")
             given.append(f"double %a{lane}_{i}")
         lines.append(f"  %y{lane} = call double @{code}({', '.join(given)})")
-        lines.append(f"  %r{lane} = insertelement {NUMBER} {result}, double %y{lane}, i32 {lane}")
+        lines.append(f"  %r{lane} = insertelement {at.doubles} {result}, double %y{lane}, i32 {lane}")
         result = f"%r{lane}"
-    return "\n".join([*lines, f"  ret {NUMBER} {result}", "}"])
+    return "\n".join([*lines, f"  ret {at.doubles} {result}", "}"])

@@ -1,4 +1,4 @@
-"""LLVM text for operations on eight numbers at a time.
+"""LLVM text for operations on some numbers at a time, eight unless there are never so many.
 
 Owns `Vectors`. Numbers are `<8 x double>`, masks `<8 x i1>`. No operation of a kernel is marked as one that may be
 reordered, fused or done by reciprocals: what it gives is what numpy gives, bit by bit; functions of the C library are
@@ -14,12 +14,10 @@ from collections.abc import Iterable, Mapping, Sequence
 from potto.kernels.native.operations import NotStraight, Operation
 
 LANES = 8
-NUMBER, WHOLE, MASK = (f"<{LANES} x {kind}>" for kind in ("double", "i64", "i1"))
 ARITHMETIC = {"add": "fadd", "sub": "fsub", "mul": "fmul", "div": "fdiv"}
 RELATIONS = {"lt": "olt", "le": "ole", "gt": "ogt", "ge": "oge", "eq": "oeq", "ne": "une"}
 INTRINSICS = {"sqrt": 1, "floor": 1, "ceil": 1, "abs": 1, "min": 2, "max": 2, "muladd": 3}
 _NAMES = {"abs": "fabs", "min": "minimum", "max": "maximum", "muladd": "fmuladd"}
-OTHERS = {"@llvm.umin.i64": ("i64", "i64, i64"), f"@llvm.vector.reduce.or.v{LANES}i1": ("i1", MASK)}
 LIBRARY = {
     "exp": 1, "log": 1, "log1p": 1, "expm1": 1, "sinh": 1, "cosh": 1, "tanh": 1, "asinh": 1, "acosh": 1, "atanh": 1,
     "sin": 1, "cos": 1, "tan": 1, "asin": 1, "acos": 1, "atan": 1, "erf": 1, "atan2": 2, "hypot": 2, "pow": 2,
@@ -32,12 +30,14 @@ def bits(value: float) -> str:
 
 
 class Vectors:
-    """Lines of a function, in loops inside of each other.
+    """Lines of a function, in loops inside of each other. lanes: how many numbers it does at a time.
 
     What is asked for twice is done once, and in the outermost loop in which all that it takes is known.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, lanes: int = LANES) -> None:
+        self.lanes = lanes
+        self.doubles, self.whole_numbers, self.masks = (f"<{lanes} x {kind}>" for kind in ("double", "i64", "i1"))
         self.bodies: list[list[str]] = [[]]
         self.known: list[dict[str, str]] = [{}]
         self.depths: dict[str, int] = {}
@@ -106,7 +106,7 @@ class Vectors:
             f"  br label %loop{stem}" if only == "true" else f"  br i1 {only}, label %loop{stem}, label %after{stem}",
             f"loop{stem}:",
             f"  %j{stem} = phi i64 [0, %before{stem}], [%next{stem}, %last{stem}]",
-            *(f"  %c{stem}.{i} = phi {NUMBER} [zeroinitializer, %before{stem}], [{name}, %last{stem}]"
+            *(f"  %c{stem}.{i} = phi {self.doubles} [zeroinitializer, %before{stem}], [{name}, %last{stem}]"
               for i, name in used),
             *body, f"  br label %last{stem}", f"last{stem}:", f"  %next{stem} = add i64 %j{stem}, 1",
             f"  %more{stem} = icmp ult i64 %next{stem}, {count}",
@@ -121,36 +121,37 @@ class Vectors:
 
     def any(self, mask: str) -> str:
         """Whether a mask holds anywhere, as an i1."""
-        return self.once(f"call i1 @llvm.vector.reduce.or.v{LANES}i1({MASK} {mask})", mask)
+        return self.once(f"call i1 @llvm.vector.reduce.or.v{self.lanes}i1({self.masks} {mask})", mask)
 
     def room(self, count: str | int) -> str:
         """Memory for so many vectors."""
         name = self.name()
-        self.bodies[0].append(f"  {name} = alloca {NUMBER}, i64 {count}, align 64")
+        self.bodies[0].append(f"  {name} = alloca {self.doubles}, i64 {count}, align 64")
         return name
 
-    def at(self, memory: str, index: str | int, kind: str = NUMBER) -> str:
-        """The place of an item."""
-        return self.once(f"getelementptr {kind}, ptr {memory}, i64 {index}", memory,
+    def at(self, memory: str, index: str | int, kind: str = "") -> str:
+        """The place of an item, by default a vector."""
+        return self.once(f"getelementptr {kind or self.doubles}, ptr {memory}, i64 {index}", memory,
                          *([index] if isinstance(index, str) else []))  # fmt: skip
 
     def load(self, place: str) -> str:
-        return self.let(f"load {NUMBER}, ptr {place}, align 8")
+        return self.let(f"load {self.doubles}, ptr {place}, align 8")
 
     def wholes(self, place: str) -> str:
         """Whole numbers, read as such."""
-        return self.let(f"load {WHOLE}, ptr {place}, align 8")
+        return self.let(f"load {self.whole_numbers}, ptr {place}, align 8")
 
     def gather(self, memory: str, index: str) -> str:
         """Numbers from these places of memory."""
-        return self.let(f"call {NUMBER} @gather(ptr {memory}, {WHOLE} {index})")
+        return self.let(f"call {self.doubles} @gather(ptr {memory}, {self.whole_numbers} {index})")
 
     def store(self, value: str, place: str) -> None:
-        self.line(f"store {NUMBER} {value}, ptr {place}, align 8")
+        self.line(f"store {self.doubles} {value}, ptr {place}, align 8")
 
     def store_wholes(self, value: str, place: str) -> None:
         """Put numbers as whole numbers."""
-        self.line(f"store {WHOLE} {self.once(f'fptosi {NUMBER} {value} to {WHOLE}', value)}, ptr {place}, align 8")
+        whole = self.once(f"fptosi {self.doubles} {value} to {self.whole_numbers}", value)
+        self.line(f"store {self.whole_numbers} {whole}, ptr {place}, align 8")
 
     def count_up(self, memory: str, index: int, by: int) -> str:
         """A whole number of a table before so much is added to it."""
@@ -174,8 +175,10 @@ class Vectors:
 
     def spread(self, scalar: str) -> str:
         """A double at all places."""
-        one = self.once(f"insertelement {NUMBER} poison, double {scalar}, i32 0", scalar)
-        return self.once(f"shufflevector {NUMBER} {one}, {NUMBER} poison, <{LANES} x i32> zeroinitializer", one)
+        one = self.once(f"insertelement {self.doubles} poison, double {scalar}, i32 0", scalar)
+        return self.once(
+            f"shufflevector {self.doubles} {one}, {self.doubles} poison, <{self.lanes} x i32> zeroinitializer", one
+        )
 
     def apply(self, code: str, *args: str) -> str:
         """An operation on numbers (masks for and, or, not; a mask first for select)."""
@@ -183,25 +186,25 @@ class Vectors:
 
     def operation(self, code: str, args: Sequence[str]) -> str:
         if code in ARITHMETIC:
-            return f"{ARITHMETIC[code]} {NUMBER} {args[0]}, {args[1]}"
+            return f"{ARITHMETIC[code]} {self.doubles} {args[0]}, {args[1]}"
         if code in RELATIONS:
-            return f"fcmp {RELATIONS[code]} {NUMBER} {args[0]}, {args[1]}"
+            return f"fcmp {RELATIONS[code]} {self.doubles} {args[0]}, {args[1]}"
         if code == "neg":
-            return f"fneg {NUMBER} {args[0]}"
+            return f"fneg {self.doubles} {args[0]}"
         if code == "nan":
-            return f"fcmp uno {NUMBER} {args[0]}, {args[0]}"
+            return f"fcmp uno {self.doubles} {args[0]}, {args[0]}"
         if code == "select":
-            return f"select {MASK} {args[0]}, {NUMBER} {args[1]}, {NUMBER} {args[2]}"
+            return f"select {self.masks} {args[0]}, {self.doubles} {args[1]}, {self.doubles} {args[2]}"
         if code in ("and", "or"):
-            return f"{code} {MASK} {args[0]}, {args[1]}"
+            return f"{code} {self.masks} {args[0]}, {args[1]}"
         if code == "not":
-            return f"xor {MASK} {args[0]}, splat (i1 true)"
-        given = ", ".join(f"{NUMBER} {arg}" for arg in args)
+            return f"xor {self.masks} {args[0]}, splat (i1 true)"
+        given = ", ".join(f"{self.doubles} {arg}" for arg in args)
         if code in INTRINSICS:
-            return f"call {NUMBER} @llvm.{_NAMES.get(code, code)}.v{LANES}f64({given})"
+            return f"call {self.doubles} @llvm.{_NAMES.get(code, code)}.v{self.lanes}f64({given})"
         if code in LIBRARY:
             self.used[code] = LIBRARY[code]
-            return f"call {NUMBER} @each_{code}({given})"
+            return f"call {self.doubles} @each_{code}({given})"
         raise NotStraight(code)
 
     def run(self, operations: Iterable[Operation], known: Mapping[str, str]) -> dict[str, str]:
@@ -221,14 +224,15 @@ class Vectors:
         return values
 
 
-def intrinsics(text: str) -> str:
+def intrinsics(text: str, at: Vectors) -> str:
     """Declarations of the intrinsics that a text calls."""
     wanted = []
     for code, arity in INTRINSICS.items():
-        name = f"@llvm.{_NAMES.get(code, code)}.v{LANES}f64"
+        name = f"@llvm.{_NAMES.get(code, code)}.v{at.lanes}f64"
         if name + "(" in text:
-            wanted.append(f"declare {NUMBER} {name}({', '.join([NUMBER] * arity)})")
-    for name, (result, parameters) in OTHERS.items():
+            wanted.append(f"declare {at.doubles} {name}({', '.join([at.doubles] * arity)})")
+    others = {"@llvm.umin.i64": ("i64", "i64, i64"), f"@llvm.vector.reduce.or.v{at.lanes}i1": ("i1", at.masks)}
+    for name, (result, parameters) in others.items():
         if name + "(" in text:
             wanted.append(f"declare {result} {name}({parameters})")
     return "\n".join(wanted)
