@@ -191,7 +191,9 @@ def _pixels(node: Sum) -> Lattice | None:
             return None
         read = _beside(other, "tent")
         near, far = read(apply("max", cell, ZERO)), read(apply("min", add(cell, ONE), last))
-        return add(near, mul(sub(place, cell), sub(far, near)))
+        # In a cell at the edge both are one element; read twice, it would seem to be two, and their difference to move.
+        ends = if_(prim("lt", cell, ZERO), ZERO, if_(prim("lt", cell, last), ONE, ZERO))
+        return add(near, mul(ends, sub(place, cell), sub(far, near)))
 
     return at.args[0], cells, lambda cell: cell, last, look
 
