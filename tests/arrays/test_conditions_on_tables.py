@@ -103,6 +103,35 @@ def f(t, xs: [n] Real, ys: [n] Real) integral [xs[0], xs[n - 1]] [interp(xs, ys,
     assert np.all(np.abs(np.asarray(found.value) - exact) <= np.asarray(found.error) + 1e-13)
 
 
+def under_a_slope(t: mp.mpf, xs: Numbers, ys: Numbers) -> mp.mpf:
+    """The area of where a piecewise linear function of x, of positive values, is less than t*y: of 1 - (function)/t
+    where that is positive, and y at most 1."""
+    total = mp.mpf(0)
+    for a, b, p, q in zip(xs, xs[1:], ys, ys[1:], strict=False):
+        share, low = 1 - p / t, 1 - q / t
+        if share < 0 or low < 0:  # only the part where it is positive, if there is any
+            total += (b - a) * max(share, low, 0) ** 2 / (2 * abs(share - low))
+        else:
+            total += (b - a) * (share + low) / 2
+    return total
+
+
+@pytest.mark.parametrize("ys", [[0.2, 0.5, 0.6, 1.0], [0.1, 0.8, 0.3, 0.9]], ids=["rising", "up and down"])
+def test_second_derivatives_of_an_area_over_a_table(ys: list[float]) -> None:
+    """The conditions of the derivatives walk through the table cell by cell, as those of the value do: by all places and
+    values that is a few thousand evaluations."""
+    module = potto.compile("""
+def f(t, xs: [n] Real, ys: [n] Real) integral ([0, 1], [xs[0], xs[n - 1]]) [interp(xs, ys, x) < t*y] d(y, x)
+""")
+    xs = [0.1, 0.3, 0.7, 1.0]
+    found = potto.hessian(module.f, ["t", "xs", "ys"])(0.85, xs, ys)
+    exact = curvatures(lambda v: under_a_slope(v[0], v[1:5], v[5:]), [0.85, *xs, *ys])
+    assert found.value == pytest.approx(exact, rel=1e-11, abs=1e-12)
+    assert np.all(np.abs(np.asarray(found.value) - exact) <= np.asarray(found.error) + 1e-14)
+    assert found.converged
+    assert found.evals < 50_000
+
+
 def test_second_derivatives_through_a_picture() -> None:
     """Between four pixels it is s*x*y: of the square 1 - A is (1 - q + q log q)/4 + (1 - q)/4 + 1/16, with q = t/s."""
     module = potto.compile("""

@@ -17,6 +17,7 @@ from potto.core.binders import apart
 from potto.core.terms import (
     ONE,
     ZERO,
+    Branch,
     Index,
     Integral,
     Prim,
@@ -27,6 +28,7 @@ from potto.core.terms import (
     apply,
     array,
     bound_names,
+    branch,
     const,
     div,
     fresh,
@@ -89,7 +91,7 @@ def by_cells(term: Integral) -> Term:
 
 def looks_up(term: Sum) -> bool:
     """Whether a sum is one over a lattice, of what lies around a place."""
-    return _factor(term, "tent") is not None or _factor(term, "between") is not None
+    return _factor(term, "tent") is not None or _way(term) is not None
 
 
 def _by_cells(term: Integral, varying: frozenset[str]) -> Term:
@@ -192,7 +194,7 @@ def _pixels(node: Sum) -> Lattice | None:
         read = _beside(other, "tent")
         near, far = read(apply("max", cell, ZERO)), read(apply("min", add(cell, ONE), last))
         # In a cell at the edge both are one element; read twice, it would seem to be two, and their difference to move.
-        ends = if_(prim("lt", cell, ZERO), ZERO, if_(prim("lt", cell, last), ONE, ZERO))
+        ends = _inside_of(cell, ZERO, last)
         return add(near, mul(ends, sub(place, cell), sub(far, near)))
 
     return at.args[0], cells, lambda cell: cell, last, look
@@ -200,7 +202,7 @@ def _pixels(node: Sum) -> Lattice | None:
 
 def _table(node: Sum) -> Lattice | None:
     """A lattice of numbers that rise: in a cell a sum of rises is that of those behind, and a part of one."""
-    way = _factor(node, "between")
+    way = _way(node)
     if way is None or node.variable in way.args[0].free:
         return None
     last, behind = node.hi, add(node.hi, ONE)
@@ -220,16 +222,25 @@ def _table(node: Sum) -> Lattice | None:
         return if_(prim("le", cell, last), end(1, apply("min", cell, last)), end(2, last))
 
     def look(other: Sum, place: Term, cell: Term) -> Term | None:
-        own = _factor(other, "between")
+        own = _way(other)
         if own is None or substitute(own, {other.variable: var(node.variable)}) is not way or other.hi is not last:
             return None
-        rise = _beside(other, "between")
+        parts = _through(other.body, own)
+        if parts is None:
+            return None
+        rise, slope = (_at(other, part) for part in parts)
         inner = apply("clamp", cell, ZERO, last)
-        part = mul(rise(inner), div(sub(place, end(1, inner)), sub(end(2, inner), end(1, inner))))
-        walked = if_(prim("lt", cell, ZERO), ZERO, if_(prim("le", cell, last), part, ZERO))
+        done = div(sub(place, end(1, inner)), sub(end(2, inner), end(1, inner)))
+        walked = mul(_inside_of(cell, ZERO, behind), add(mul(rise(inner), done), slope(inner)))
         return add(_behind(rise, cell, behind), walked)
 
     return way.args[0], cells, border, behind, look
+
+
+def _inside_of(cell: Term, first: Term, end: Term) -> Term:
+    """1 for the cells from the first one on and before the end, 0 for others: as a factor, so that surfaces are one for
+    all cells."""
+    return if_(prim("lt", cell, first), ZERO, if_(prim("lt", cell, end), ONE, ZERO))
 
 
 def _behind(rise: Callable[[Term], Term], cell: Term, last: Term) -> Term:
@@ -242,6 +253,44 @@ def _behind(rise: Callable[[Term], Term], cell: Term, last: Term) -> Term:
         if slot in before.free and add(substitute(before, {slot: add(var(slot), ONE)}), part) is each:
             return sub(substitute(before, {slot: apply("max", cell, ZERO)}), substitute(before, {slot: ZERO}))
     return sum_(slot, ZERO, sub(apply("min", cell, last), ONE), each)
+
+
+def _way(term: Sum) -> Prim | None:
+    """How much of the way through a cell is done, in the terms of a sum over the cells of a table."""
+    found = (node for node in postorder(term.body) if isinstance(node, Prim) and node.op == "between")
+    own = next((node for node in found if term.variable in node.free), None)
+    return None if own is None or _through(term.body, own) is None else own
+
+
+def _through(term: Term, way: Prim) -> tuple[Term, Term] | None:
+    """What a term is in proportion to: how much of the way through a cell is done, and 1 in the cell and 0 elsewhere,
+    as the derivatives of that are. None where it is anything more."""
+    match term:
+        case _ if term is way:
+            return ONE, ZERO
+        case Branch(then=Branch(then=slope)) if term is _within(way, slope):
+            return ZERO, slope
+        case Prim(op="add", args=args):
+            parts = [_through(arg, way) for arg in args]
+            known = [part for part in parts if part is not None]
+            return (add(*(a for a, _ in known)), add(*(b for _, b in known))) if len(known) == len(parts) else None
+        case Prim(op="neg", args=(arg,)):
+            return None if (part := _through(arg, way)) is None else (neg(part[0]), neg(part[1]))
+        case Prim(op="mul", args=args):
+            walked = [(place, part) for place, arg in enumerate(args) if (part := _through(arg, way)) is not None]
+            if len(walked) != 1:
+                return None
+            ((place, (rise, slope)),) = walked
+            rest = args[:place] + args[place + 1 :]
+            return mul(*rest, rise), mul(*rest, slope)
+        case _:
+            return None
+
+
+def _within(way: Prim, slope: Term) -> Term:
+    """What its partial derivatives are: a slope in the cell, and 0 elsewhere."""
+    x, start, end = way.args
+    return branch((sub(x, start),), False, branch((sub(end, x),), True, slope, ZERO), ZERO)
 
 
 def _factor(term: Sum, op: str) -> Prim | None:
@@ -257,5 +306,9 @@ def _beside(term: Sum, op: str) -> Callable[[Term], Term]:
     """The other factors of the terms of a sum, by the index."""
     own, body = _factor(term, op), term.body
     factors = body.args if isinstance(body, Prim) and body.op == "mul" else (body,)
-    rest = mul(*(factor for factor in factors if factor is not own))
-    return lambda place: substitute(rest, {term.variable: place})
+    return _at(term, mul(*(factor for factor in factors if factor is not own)))
+
+
+def _at(term: Sum, part: Term) -> Callable[[Term], Term]:
+    """A part of the terms of a sum, by the index."""
+    return lambda place: substitute(part, {term.variable: place})

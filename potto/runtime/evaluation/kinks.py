@@ -12,7 +12,7 @@ import numpy as np
 
 from potto.core.terms import Branch, Prim, Term, function_of, prim, var
 from potto.integrate.events import OneSidedDerivatives, TwoSided
-from potto.kernels.cells import Array, Bools, Cell
+from potto.kernels.cells import Array, Bools, Cell, Number
 from potto.kernels.kinks import places
 from potto.kernels.tape import Node
 from potto.primitives import PRIMITIVES
@@ -50,7 +50,9 @@ def note_kink(
 def _note_jump(machine: Machine, surface: Term, near: Bools, args: tuple[Cell, ...]) -> None:
     """Note where what is at a jump moves: derivatives that nobody knows by the jump alone."""
     tapes = machine.taping and any(arg.t[0] is not None for arg in args)
-    rows = [[x for arg in args if (x := arg.t[d]) is not None] for d in range(machine.directions)]
+    rows = [
+        _apart([x for arg in args if (x := arg.t[d]) is not None], machine.taping) for d in range(machine.directions)
+    ]
     # The numbers may be the same for all that is asked at once, and move in as many ways, as for a Hessian.
     near = np.broadcast_to(near, np.broadcast_shapes(near.shape, *(np.shape(x) for row in rows for x in row)))
     moves = np.array([near & (tapes | np.any([np.broadcast_to(x != 0, near.shape) for x in row], axis=0))
@@ -59,6 +61,11 @@ def _note_jump(machine: Machine, surface: Term, near: Bools, args: tuple[Cell, .
     if moves.any() and not machine.record.again(cause):
         unknown = np.where(moves, np.nan, 0.0)
         machine.record.meet(OneSidedDerivatives(cause, unknown, unknown, unknown, unknown))
+
+
+def _apart(tangents: list[Number], taping: bool) -> list[Number]:
+    """How what is at a jump moves: two numbers that are compared, and move alike, stay as they are to one another."""
+    return [tangents[0] - tangents[1]] if len(tangents) == 2 and not taping else tangents
 
 
 def _on_side(machine: Machine, term: Prim, args: tuple[Cell, ...], side: int) -> tuple[Array, Array]:
