@@ -5,6 +5,7 @@ Owns `without_arrays`, `in_numbers`, `in_places` and `as_written`.
 
 from __future__ import annotations
 
+from collections import Counter
 from functools import lru_cache, reduce
 
 import numpy as np
@@ -15,7 +16,26 @@ from potto.calculus.inlining.arrays import MOST_STEPS, TooMany, each_integral, i
 from potto.calculus.inlining.lattices import by_cells
 from potto.calculus.inlining.reads import Access, hoisted
 from potto.calculus.solving.pivots import NoClosedForm
-from potto.core.terms import Index, Integral, Term, function_of, proj, substitute, tuple_, var
+from potto.core.terms import (
+    Branch,
+    Holding,
+    If,
+    Index,
+    Integral,
+    Sum,
+    Term,
+    bound_names,
+    children,
+    fresh,
+    function_of,
+    postorder,
+    postorder_by,
+    proj,
+    substitute,
+    transform,
+    tuple_,
+    var,
+)
 from potto.diagnostics import PottoError, declare
 from potto.kernels import errors
 from potto.kernels.cells import Cell, Env, Number, Value
@@ -118,16 +138,50 @@ def _read(machine: Machine, term: Integral, accesses: tuple[Access, ...], env: E
     read: Read = {}
     here = {name: env[name] for name in term.free if name in env}
     parts: dict[str, Term] = {}
+    known = dict(env)
+    for name, found in _in_turn(accesses):
+        known[name] = machine.evaluate(function_of(found), {own: known[own] for own in found.free}, None)
     for access in accesses:
-        value = machine.evaluate(function_of(access.term), {name: env[name] for name in access.term.free}, None)
+        value = known[access.name]
         if isinstance(value, tuple):
             parts[access.name] = in_names(access.name, value, here)
             read |= _parts_of(access.term, access.name, value)
         else:
             here[access.name] = value
             read[access.name] = access.term
-    found = substitute(term, parts) if parts else term
-    return found, {name: here[name] for name in found.free}, read
+    whole = substitute(term, parts) if parts else term
+    return whole, {name: here[name] for name in whole.free}, read
+
+
+@lru_cache(maxsize=1024)
+def _in_turn(accesses: tuple[Access, ...]) -> tuple[tuple[str, Term], ...]:
+    """Names and terms to be found one after the other, each by those before: all accesses, and before them places that
+    several lead through and that are counted for, as the cell of a table is."""
+    sums = Holding(Sum)
+    met = Counter(node for access in accesses for node in set(_surely(access.term)) if isinstance(node, Index))
+    shared = [node for node, times in met.items() if times > 1 and sums(node.index)]
+    taken = {access.name for access in accesses}.union(*(access.term.free for access in accesses))
+    names: dict[Term, Term] = {}
+    found = []
+    for node in sorted(shared, key=lambda node: len(postorder(node))):
+        name = fresh("place", taken)
+        taken.add(name)
+        found.append((name, _by_names(node, names)))
+        names[node] = var(name)
+    return (*found, *((access.name, _by_names(access.term, names)) for access in accesses))
+
+
+def _surely(term: Term) -> list[Term]:
+    """The parts of a term that are evaluated whatever its conditions come to."""
+
+    def below(node: Term) -> tuple[Term, ...]:
+        return children(node)[:-2] if isinstance(node, If | Branch) else () if bound_names(node) else children(node)
+
+    return postorder_by(term, below)
+
+
+def _by_names(term: Term, names: dict[Term, Term]) -> Term:
+    return transform(term, lambda node, new: names.get(node, new), lambda node: () if node in names else children(node))
 
 
 def _parts_of(term: Term, name: str, value: Value) -> Read:
