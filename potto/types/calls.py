@@ -239,11 +239,12 @@ class _Filling:
     def _unknown_keyword(self, argument: nodes.Argument, names: tuple[str, ...]) -> Diagnostic:
         if not names:
             return _no_names(argument, self.node)
+        given = {other.name for other in self.node.arguments}
         record = _record_of(self.parameters, resolve(self.made))
         if record is not None:
             span = argument.name_span or argument.span
-            return no_field(self.inference.outside, span, argument.name or "", record)
-        near = near_names(argument.name or "", names)
+            return no_field(self.inference.outside, span, argument.name or "", record, given)
+        near = near_names(argument.name or "", [name for name in names if name not in given])
         return kinds.UNKNOWN_KEYWORD(
             argument.name_span or argument.span,
             f"{callee_name(self.node)} has no parameter `{argument.name}`",

@@ -5,7 +5,7 @@ Owns `describe`, a type in the middle of a sentence, and the diagnostics that se
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 
 from potto.diagnostics import Diagnostic, Related, Replacement, Suggestion, shortened
 from potto.modules.texts import definition, source
@@ -290,13 +290,15 @@ def shadowing(local: Local, before: Local) -> Diagnostic:
     )
 
 
-def no_field(outside: Outside, span: Span, name: str, record: RecordName) -> Diagnostic:
-    """What is said of a field that a record doesn't have."""
+def no_field(
+    outside: Outside, span: Span, name: str, record: RecordName, given: Collection[str | None] = ()
+) -> Diagnostic:
+    """What is said of a field that a record doesn't have. given: the names beside it, which it is not meant to be."""
     item = definition(outside.db, record.file, record.name) if "." not in record.name else None  # else it is data
     related = _header(outside, record, name)
     if item is not None:
         related = (Related(item.name_span, f"`{record.name}` is defined here", record.file, record.name),)
-    near = near_names(name, record.fields)
+    near = near_names(name, [field for field in record.fields if field not in given])
     help = did_you_mean(near) or "it has " + ", ".join(f"`{name}`" for name in record.fields)
     label = f"no field `{name}`"
     message = f"a record `{record.name}` has {label}"

@@ -97,13 +97,14 @@ def _with(inference: Inference, node: nodes.With) -> Type:
     found = resolve(type)
     record = found.record if isinstance(found, TupleOf) else None
     places: list[int] = []
+    named = {argument.name for argument in node.arguments}
     for argument in node.arguments:
         given = inference.infer(argument.value)
         if record is None or not isinstance(found, TupleOf):
             continue
         if argument.name not in record.fields:
             name, span = argument.name or "", argument.name_span or argument.span
-            inference.report(no_field(inference.outside, span, name, record))
+            inference.report(no_field(inference.outside, span, name, record, named))
             continue
         place = record.fields.index(argument.name)
         inference.expect(given, found.items[place], argument.value, f"the field `{argument.name}`")

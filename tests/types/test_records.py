@@ -41,6 +41,21 @@ def test_a_record_of_another_name_is_made_of_the_fields_of_the_first():
     assert only(text).help == "write `Vec(x=p.x, y=p.y)`"
 
 
+@pytest.mark.parametrize(
+    ("call", "help"),
+    [
+        ("Camera(eye=1, focal=1, foo=2)", "it has `eye`, `focal`"),
+        ("Camera(eye=1, foo=2)", "did you mean `focal`?"),
+        ("Camera(1, 2) with (focal = t, foo = 2)", "it has `eye`, `focal`"),
+        ("lens(focal=1, foo=2)", "it has `eye`, `focal`"),
+        ("lens(eye=1, foo=2)", "did you mean `focal`?"),
+    ],
+)
+def test_a_name_that_is_given_is_not_suggested(call: str, help: str):
+    text = f"record Camera(eye: Real, focal: Real)\ndef lens(eye, focal) eye*focal\ndef f(t) {call}"
+    assert only(text).help == help
+
+
 def test_mistakes():
     check("""
         record Vec(x: Real, y: Real)
