@@ -64,7 +64,7 @@ def answers(text: str, way: str, places: Sequence[tuple[float, float]], by_text:
     """What calls tell, by texts that are written at once, or step by step."""
     call = WAYS[way](potto.compile(text).f)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(sum_text, "OFTEN", 0)
+        patch.setattr(sum_text, "TERM", 0.0)
         if not by_text:
             patch.setattr(RepeatedSum, "text", lambda *_: None)
         return [told(call(*place)) for place in places]
@@ -133,7 +133,7 @@ def formula(pick: random.Random, names: list[str], depth: int) -> str:
 
 @pytest.mark.filterwarnings("error")
 def test_beyond_the_region_the_general_way_answers(by_text: list[SumText], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sum_text, "OFTEN", 0)
+    monkeypatch.setattr(sum_text, "TERM", 0.0)
     f = potto.compile(PROGRAMS["one variable"]).f
     for a, b in ((0.3, 1.0), (0.3, 1.0), (1.9, 1.0), (0.0, 1.0), (-1.0, 1.0), (5.0, 1.0), (0.3, -700.0)):
         exact = -math.expm1(-b * min(max(a, 0.0), 2.0)) / b
@@ -149,7 +149,7 @@ def test_what_has_no_text_is_added_up_step_by_step(monkeypatch: pytest.MonkeyPat
         asked.append(given)
         raise NotStraight
 
-    monkeypatch.setattr(sum_text, "OFTEN", 1)
+    monkeypatch.setattr(sum_text, "TERM", 0.0)
     monkeypatch.setattr(SumText, "of", none)
     with potto.settings(backend="numpy"):
         f = potto.grad(potto.compile("def f(a, b) integral [0, 3] exp(-b*x)*[x < a] d(x)").f, "a")
@@ -161,12 +161,24 @@ def test_what_has_no_text_is_added_up_step_by_step(monkeypatch: pytest.MonkeyPat
 
 
 def test_the_text_is_written_when_that_pays() -> None:
-    sums, asked = RepeatedSum(), []
+    sums, asked = RepeatedSum(100), []
+    cost = 100 * sum_text.TERM
 
     def write() -> SumText:
-        asked.append(sums.calls)
+        asked.append(sums.spent)
         raise NotStraight
 
-    for _ in range(sum_text.OFTEN + 5):
+    for spent in (0.0, cost, 1.9 * cost, 2.1 * cost, 3 * cost):
+        sums.spent = spent
         assert sums.text(write) is None
-    assert asked == [sum_text.OFTEN + 1]
+    assert asked == [2.1 * cost]
+
+
+def test_calls_are_answered_by_text_before_long(by_text: list[SumText]) -> None:
+    f = potto.compile("def f(a, b) integral ([0, 1], [0, 3]) exp(-b*x*y)*[x + y < a] d(x, y)").f
+    first = told(potto.grad(f, "a")(0.3, 0.7))
+    for _ in range(400):  # some 50 would do; each takes at least 50 us
+        assert told(potto.grad(f, "a")(0.3, 0.7)) == first
+        if by_text:
+            break
+    assert len(by_text) == 1

@@ -8,6 +8,7 @@ left around it is written out once, as a text with these numbers in it; where th
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
 from types import CodeType
@@ -41,7 +42,7 @@ class SettledRegion(Struct, eq=False):
 
     machine: one that keeps track of rounding. box: per parameter, between which numbers. truncation: a bound of what
     the rule leaves out, of the value and each tangent. sums: those that numpy adds up. straight: the function for the
-    region; None as long as these were not asked for often enough. awaited: the function of machine code for which numpy
+    region; None as long as these have not taken long enough. awaited: the function of machine code for which numpy
     stands in until it is due; None where it does for good.
     """
 
@@ -82,10 +83,11 @@ class SettledRegion(Struct, eq=False):
         if text is not None:
             self.straight = text.at_region(self.region, _limits(self.box, self.truncation, self.machine))
             return self.straight(env)  # type: ignore[no-any-return]
-        plan, machine = self.plan, self.machine
+        plan, machine, start = self.plan, self.machine, time.thread_time()
         with np.errstate(all="ignore"):
             frame = evaluated(plan.frames[0], machine, env)
             found = summed(plan.variables, plan.frames, self.region, machine, env, frame)
+        self.sums.spent += time.thread_time() - start
         return None if found is None else accurate(found, self.truncation, machine.rtol, machine.atol)
 
     @np.errstate(all="ignore")

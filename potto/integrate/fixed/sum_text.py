@@ -19,6 +19,7 @@ import numpy as np
 from msgspec import Struct
 
 from potto.core.terms import Lam, Term, function_of
+from potto.integrate.fixed.lowered import terms_of
 from potto.integrate.fixed.moving_sums import SUMMED
 from potto.integrate.fixed.straight import StraightIntegral
 from potto.integrate.pieces import Evaluator
@@ -29,8 +30,10 @@ from potto.kernels.flat_lines import Flat, FlatCell, FlatLines
 from potto.kernels.making import compiling, making
 from potto.kernels.native.operations import NotStraight
 
-# After how many calls the text is written: that takes about as long as it saves at so many, whatever is integrated.
-OFTEN, MOST_TEXTS = 64, 64
+# Seconds that the text takes for each term and each of its tangents: 40 to 97 us, of eq. (1) 78. How many times as long
+# numpy adds up before it is written, which then takes half as long.
+TERM, PAYS = 80e-6, 2
+MOST_TEXTS = 64
 
 
 class SumText(Struct, frozen=True, eq=False):
@@ -76,26 +79,32 @@ class SumText(Struct, frozen=True, eq=False):
 
 
 class RepeatedSum(Struct):
-    """Sums that numpy adds up again and again, and their text from when on that pays; `impossible`: there is none."""
+    """Sums that numpy adds up again and again, and their text from when on that pays; `impossible`: there is none.
 
-    calls: int = 0
+    terms: of what is integrated, its bounds and cuts, with their tangents. spent: seconds of the processor so far.
+    """
+
+    terms: int
+    spent: float = 0.0
     written: SumText | None = None
     impossible: bool = False
 
     @classmethod
     def of(cls, plan: StraightIntegral, region: Region, machine: Evaluator, env: Mapping[str, Any]) -> RepeatedSum:
         """Of all regions with these integrands, for parameters that move as these do."""
-        kinds = tuple([pattern(env[name], machine.directions) for name in plan.names])
-        key = faces_of(region), kinds, machine.directions
-        if len(plan.texts) >= MOST_TEXTS:
-            plan.texts.clear()
-        found: RepeatedSum = plan.texts.setdefault(key, cls())
+        kinds, faces = tuple([pattern(env[name], machine.directions) for name in plan.names]), faces_of(region)
+        key = faces, kinds, machine.directions
+        found: RepeatedSum | None = plan.texts.get(key)
+        if found is None:
+            if len(plan.texts) >= MOST_TEXTS:
+                plan.texts.clear()
+            terms = sum(terms_of(plan, face) for face in faces) * (1 + machine.directions)
+            found = plan.texts[key] = cls(terms)
         return found
 
     def text(self, write: Callable[[], SumText]) -> SumText | None:
         """The text if it is to be used now. write: what makes it; may raise NotStraight."""
-        self.calls += 1
-        if self.written is None and self.calls > OFTEN and not self.impossible:
+        if self.written is None and not self.impossible and self.spent >= PAYS * TERM * self.terms:
             with making, compiling:
                 try:
                     self.written = write()
