@@ -243,6 +243,10 @@ NO_DIGITS = Shortfall(
     "no accuracy was reached: the integral diverges, its integrand is too rough, or rounding hides it",
     f"{POLE}; if the integrand is only rough, sampling gives a few digits (`--method mc`)",
 )
+CANCELLED = Shortfall(
+    "its parts cancel: what is left of them is no larger than its error",
+    "beside its parts it is 0; `--atol` says which error of it is small enough",
+)
 ROUNDED = Shortfall(
     "rounding limits the accuracy", f"more evaluations cannot help, the numbers have no more digits: {LESS}"
 )

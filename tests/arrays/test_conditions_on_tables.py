@@ -199,6 +199,19 @@ def f(t, p: [n, m] Real) integral ([0, 1], [0, 1]) [image(p, u, v) < t] d(u, v)
     assert found.evals < 100_000
 
 
+def test_what_cancels_is_said_to() -> None:
+    """The level's second derivative is made of parts that cancel. Nothing diverges, nothing is rough."""
+    module = potto.compile("""
+def f(t, p: [n, m] Real) integral ([0, 1], [0, 1]) [image(p, u, v) < t] d(u, v)
+""")
+    rows = [[0.1, 0.5, 0.3], [0.7, 0.2, 0.9]]
+    found = potto.hessian(module.f, "t")(0.4, rows)
+    picture = [[mp.mpf(x) for x in row] for row in rows]
+    exact = curvatures(lambda v: picture_below(v[0], picture), [0.4])[0, 0]
+    assert abs(found.value - exact) <= found.error <= 1e-9
+    assert [why.message[:17] for why in found.shortfalls] in ([], ["its parts cancel:"])
+
+
 def test_a_second_derivative_at_a_place_of_the_table_does_not_exist() -> None:
     """There the first one jumps: from 0.6 to 4."""
     module = potto.compile("""

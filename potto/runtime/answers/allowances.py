@@ -86,6 +86,12 @@ class Allowance(Struct, frozen=True):
     def holds(self) -> tuple[Any, Any]:
         return self.kept, self.finite
 
+    def added_up(self, rtol: float) -> Any:
+        """How much is added up in the integral for which that is most, up to UNIT: at least so much, where something
+        small could be lost."""
+        share = min(rtol, CANCELS)
+        return self.most / share if share else 0.0
+
     def error(self, rtol: float) -> Any:
         """The error up to which an answer is 0 as accurately as asked for."""
         arithmetic = min(rtol, CANCELS) * UNIT

@@ -15,6 +15,7 @@ from msgspec.structs import replace
 
 from potto.core.terms import Integral
 from potto.integrate.events import (
+    CANCELLED,
     INFINITE,
     NO_BOUND,
     NO_DIGITS,
@@ -108,7 +109,8 @@ def missed(value: Any, error: Any, allowed: Allowance, settings: Settings, drawn
     if not bad.any():
         return {}
     reasons: Shortfalls = {}
-    for reason, holds in _told(v, e, drawn):
+    little = ONLY_ROUNDED * allowed.over(v.shape).added_up(settings.rtol)
+    for reason, holds in _told(v, e, little, drawn):
         here = bad & holds
         if here.any():
             reasons[reason] = here if v.ndim else True
@@ -116,8 +118,9 @@ def missed(value: Any, error: Any, allowed: Allowance, settings: Settings, drawn
     return reasons
 
 
-def _told(v: Array, e: Array, drawn: bool) -> Sequence[tuple[Shortfall, Any]]:
-    """The reasons in the order in which they count, and where each is one."""
+def _told(v: Array, e: Array, little: Array, drawn: bool) -> Sequence[tuple[Shortfall, Any]]:
+    """The reasons in the order in which they count, and where each is one. little: what is hardly anything of what was
+    added up."""
     nan = np.isnan(v)
     with np.errstate(invalid="ignore"):
         lost, rounded = e > LOST * v, e < ONLY_ROUNDED * v
@@ -128,6 +131,7 @@ def _told(v: Array, e: Array, drawn: bool) -> Sequence[tuple[Shortfall, Any]]:
         (UNBOUNDED_SAMPLES, ~np.isfinite(e) & drawn),
         (NO_BOUND, ~np.isfinite(e)),
         (TOO_FEW, np.full(v.shape, drawn)),
+        (CANCELLED, lost & (e <= little)),
         (NO_DIGITS, lost),
         (ROUNDED, rounded),
         (TOO_LARGE, np.full(v.shape, True)),
