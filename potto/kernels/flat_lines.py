@@ -18,7 +18,7 @@ import numpy as np
 from msgspec import Struct
 
 from potto.kernels.native.operations import ARITHMETIC, NotStraight, number_of
-from potto.kernels.native.straight import ArgumentPart, Packed, StraightKernel, packed
+from potto.kernels.native.straight import ArgumentPart, Packed, packed, statements_of
 from potto.kernels.whole import UNIT_ROUNDOFF
 from potto.kernels.written import Kernel
 
@@ -201,15 +201,15 @@ class FlatLines:
         """The cells that a plain kernel makes of these. Raises NotStraight."""
         if not kernel.plain:
             raise NotStraight(kernel.text)
-        straight = StraightKernel.of(kernel)
-        names = {name: args[part.path[0]].part(part) or self.zero for name, part in straight.parts.items()}
-        for line in straight.lines:
-            match line.node:
+        statements, parts, result = statements_of(kernel.text)
+        names = {name: args[part.path[0]].part(part) or self.zero for name, part in parts.items()}
+        for statement in statements:
+            match statement:
                 case ast.Assign(targets=[ast.Name(id=name)], value=value):
                     names[name] = self.put(value, names, kernel.run.__globals__)
                 case _:
-                    raise NotStraight(ast.unparse(line.node))
-        return [self.cell(cell, names) for cell in packed(straight.result)]
+                    raise NotStraight(ast.unparse(statement))
+        return [self.cell(cell, names) for cell in packed(result)]
 
     def cell(self, cell: Packed, names: Mapping[str, Flat]) -> FlatCell:
         def part(name: str | None) -> Flat | None:

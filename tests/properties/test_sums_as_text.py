@@ -177,7 +177,7 @@ def test_the_text_is_written_when_that_pays() -> None:
 def test_calls_are_answered_by_text_before_long(by_text: list[SumText]) -> None:
     f = potto.compile("def f(a, b) integral ([0, 1], [0, 3]) exp(-b*x*y)*[x + y < a] d(x, y)").f
     first = told(potto.grad(f, "a")(0.3, 0.7))
-    for _ in range(400):  # some 50 would do; each takes at least 50 us
+    for _ in range(400):  # some 40 would do
         assert told(potto.grad(f, "a")(0.3, 0.7)) == first
         if by_text:
             break

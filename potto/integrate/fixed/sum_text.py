@@ -30,9 +30,9 @@ from potto.kernels.flat_lines import Flat, FlatCell, FlatLines
 from potto.kernels.making import compiling, making
 from potto.kernels.native.operations import NotStraight
 
-# Seconds that the text takes for each term and each of its tangents: 40 to 97 us, of eq. (1) 78. How many times as long
+# Seconds that the text takes for each term and each of its tangents: 29 to 88 us, of eq. (1) 61. How many times as long
 # numpy adds up before it is written, which then takes half as long.
-TERM, PAYS = 80e-6, 2
+TERM, PAYS = 60e-6, 2
 MOST_TEXTS = 64
 
 

@@ -1,9 +1,9 @@
 """Kernels' texts as straight lines of operations, and which of these don't depend on the point.
 
-Owns `FlatKernel`, all operations of a kernel, and `StraightKernel`, for which it is told what varies. The text of a
-plain kernel (`writing`) is its intermediate form: arguments are taken apart, numbers are computed one line after the
-other, cells are put together. What depends only on arguments that are the same at every point is computed once, by the
-lines as they are; the rest are operations on numbers and masks.
+Owns `statements_of`, `FlatKernel`, all operations of a kernel, and `StraightKernel`, for which it is told what varies.
+The text of a plain kernel (`writing`) is its intermediate form: arguments are taken apart, numbers are computed one
+line after the other, cells are put together. What depends only on arguments that are the same at every point is
+computed once, by the lines as they are; the rest are operations on numbers and masks.
 """
 
 from __future__ import annotations
@@ -74,7 +74,7 @@ class StraightKernel(Struct, frozen=True):
     @classmethod
     def of(cls, kernel: Kernel, forced: Iterable[int] = ()) -> StraightKernel:
         """The lines of a plain kernel, whose trace forces the sides of these sites. Raises NotStraight."""
-        statements, parts, result = _read(kernel.text, frozenset(forced))
+        statements, parts, result = statements_of(kernel.text, frozenset(forced))
         calls = _Calls()
         lines = tuple(_line(line) for node in statements for line in calls.before(node))
         return cls(kernel, parts, lines, result)
@@ -119,7 +119,7 @@ class FlatKernel(Struct, frozen=True):
     @classmethod
     def of(cls, kernel: Kernel) -> FlatKernel:
         """The operations of a plain kernel. Raises NotStraight."""
-        statements, parts, result = _read(kernel.text)
+        statements, parts, result = statements_of(kernel.text)
         wanted = {name for cell in packed(result) for name in cell.parts()}
         return cls(parts, needed(flattened(statements), wanted), result)
 
@@ -155,7 +155,9 @@ def packed(result: Result) -> Iterator[Packed]:
 # Statements
 
 
-def _read(text: str, forced: frozenset[int] = frozenset()) -> tuple[list[ast.stmt], dict[str, ArgumentPart], Result]:
+def statements_of(
+    text: str, forced: frozenset[int] = frozenset()
+) -> tuple[list[ast.stmt], dict[str, ArgumentPart], Result]:
     """The statements of a plain kernel that work something out, the parts of arguments, and what is given back."""
     definition = ast.parse(text).body[0]
     assert isinstance(definition, ast.FunctionDef)
