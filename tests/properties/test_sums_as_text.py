@@ -5,6 +5,7 @@ That step by step is held against closed forms and mpmath elsewhere: here nothin
 
 from __future__ import annotations
 
+import itertools
 import math
 import random
 from collections.abc import Callable, Iterator, Sequence
@@ -16,7 +17,9 @@ from how_many import examples
 
 import potto
 from potto.integrate.fixed import sum_text
+from potto.integrate.fixed.settled import SettledRegion
 from potto.integrate.fixed.sum_text import RepeatedSum, SumText
+from potto.kernels.cells import Cell
 from potto.kernels.native.operations import NotStraight
 
 WAYS: dict[str, Callable[[Any], Callable[..., potto.Estimate]]] = {
@@ -61,12 +64,14 @@ def told(found: potto.Estimate) -> str:
 
 
 def answers(text: str, way: str, places: Sequence[tuple[float, float]], by_text: bool) -> list[str]:
-    """What calls tell, by texts that are written at once, or step by step."""
+    """What calls tell, by texts that are written once a call was answered, or step by step: what is not the same in
+    that call is not used at all."""
     call = WAYS[way](potto.compile(text).f)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(sum_text, "TERM", 0.0)
-        if not by_text:
-            patch.setattr(RepeatedSum, "text", lambda *_: None)
+        patch.setattr(sum_text, "TERM", math.inf)
+        call(*places[0])
+        if by_text:
+            patch.setattr(sum_text, "TERM", 0.0)
         return [told(call(*place)) for place in places]
 
 
@@ -140,6 +145,31 @@ def test_beyond_the_region_the_general_way_answers(by_text: list[SumText], monke
         assert f(a, b).value == pytest.approx(exact, rel=1e-13, abs=0)  # closed form, to rounding
     assert f(0.3, math.inf).value == 0 or not f(0.3, math.inf).converged
     assert by_text
+
+
+@pytest.mark.parametrize("program", ["cuts of cuts", "moving bounds", "three variables"])
+def test_where_cuts_cross_both_say_nothing(program: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Far outside of the region, where cells are others, or bounds the wrong way round."""
+    found: list[SettledRegion] = []
+    monkeypatch.setattr(SettledRegion, "at", lambda self, env: found.append(self))
+    with potto.settings(backend="numpy"):
+        slope = potto.grad(potto.compile(PROGRAMS[program]).f, ("a", "b"))
+        slope(0.3, 0.7), slope(0.3, 0.7)
+    monkeypatch.undo()
+    region = found[0]
+    box = tuple((name, -math.inf, math.inf) for name, _, _ in region.box)
+
+    def wide(terms: int) -> SettledRegion:
+        given = region.plan, region.region, region.machine, box, region.truncation
+        return SettledRegion(*given, RepeatedSum(terms), None, None)
+
+    step_by_step, by_text, nothing = wide(10**18), wide(0), 0
+    for a, b in itertools.product(np.linspace(-1, 2, 13).tolist(), (-0.5, 0.3, 0.7, 1.5)):
+        env = {"a": Cell(a, None, (1.0, None)), "b": Cell(b, None, (None, 1.0))}
+        answer = step_by_step.at(env)
+        assert repr(answer) == repr(by_text.at(env))
+        nothing += answer is None
+    assert by_text.straight is not None and step_by_step.straight is None and 0 < nothing < 52
 
 
 def test_what_has_no_text_is_added_up_step_by_step(monkeypatch: pytest.MonkeyPatch) -> None:
