@@ -11,8 +11,8 @@ from typing import Any
 
 from msgspec import Struct
 
-from potto.calculus.algebra.affine import affine
-from potto.calculus.decomposition.surface_cuts import Cut, HalfPlanes
+from potto.calculus.decomposition.circular_regions import polynomial
+from potto.calculus.decomposition.surface_cuts import CircularRegion, Cut
 from potto.calculus.decomposition.sweep import Level
 from potto.core.terms import Lam, Term, function_of, neg, prim, tuple_
 
@@ -25,9 +25,10 @@ MANY_WALLS = 4  # from which on it is found out between which two of them someth
 class LevelPlan(Struct, frozen=True, dict=True):
     """One variable: its frame (bounds, then candidate cuts, as one tuple term) and what the cuts are.
 
-    corners: cuts that are corners of half planes, with what these are, three numbers each.
+    corners: cuts that are corners of regions.
     walls: rows of the frame, bounds not counted, beyond which nothing is integrated, on the side that the signs of
-    `slopes` tell: above those with a slope below 0, below the others.
+    `slopes` tell: above those with a slope below 0, below the others. Two roots of a surface are a wall on either side,
+    where its square has a coefficient below 0.
     """
 
     level: Level
@@ -38,8 +39,8 @@ class LevelPlan(Struct, frozen=True, dict=True):
     decided: tuple[int, ...]
     surfaces: Lam
     turned: tuple[tuple[int, ...], ...]
-    corners: tuple[tuple[int, Lam], ...] = ()
-    walls: tuple[int, ...] = ()
+    corners: tuple[Corners, ...] = ()
+    walls: tuple[tuple[int, ...], ...] = ()
     slopes: Lam = NOTHING
 
     @property
@@ -61,6 +62,17 @@ class LevelPlan(Struct, frozen=True, dict=True):
     def bounds(self) -> Lam:
         """The bounds alone, as a pair."""
         return function_of(tuple_((self.level.lo, self.level.hi)))
+
+
+class Corners(Struct, frozen=True):
+    """The corners of a region as a cut: its number, how many lines there are, the numbers of these and of circles, the
+    variable further in, and the surfaces of circles and lines."""
+
+    cut: int
+    lines: int
+    numbers: Lam
+    further_in: str
+    surfaces: Lam
 
 
 class Group(Struct, frozen=True):
@@ -111,7 +123,7 @@ def level_plan(level: Level, decided: tuple[int, ...], groups: Sequence[Group]) 
         rows.extend((kind, False) for _ in places)
     deciding, turned = _deciding(decided, groups)
     surfaces = function_of(tuple_(deciding))
-    corners = tuple((number, _numbers_of(cut.corners)) for number, cut in enumerate(level.cuts) if cut.corners)
+    corners = tuple(_corners(number, cut.corners) for number, cut in enumerate(level.cuts) if cut.corners)
     return LevelPlan(
         level,
         function_of(tuple_(tuple(terms))),
@@ -126,22 +138,25 @@ def level_plan(level: Level, decided: tuple[int, ...], groups: Sequence[Group]) 
     )
 
 
-def _numbers_of(region: HalfPlanes) -> Lam:
-    return function_of(tuple_(tuple(number for plane in region.planes for number in plane)))
+def _corners(cut: int, region: CircularRegion) -> Corners:
+    numbers = (number for edge in (*region.lines, *region.circles) for number in edge)
+    surfaces = function_of(tuple_(region.surfaces))
+    return Corners(cut, len(region.lines), function_of(tuple_(tuple(numbers))), region.further_in, surfaces)
 
 
-def _walls(level: Level, rows: Sequence[tuple[int, bool]]) -> tuple[tuple[int, ...], Lam]:
-    """The rows beyond which nothing is integrated, and slopes of their surfaces towards the side where something is."""
-    walls: list[int] = []
-    slopes: list[Term] = []
+def _walls(level: Level, rows: Sequence[tuple[int, bool]]) -> tuple[tuple[tuple[int, ...], ...], Lam]:
+    """The rows beyond which nothing is integrated, and what tells on which side of them something is."""
+    own: dict[int, list[int]] = {}
     for row, (number, _) in enumerate(rows):
-        cut = level.cuts[number] if number >= 0 else None
-        if cut is None or not cut.holds or cut.product is not None or len(cut.roots or ()) != 1 or cut.families:
-            continue
-        form = affine(cut.surface, (level.variable,))
-        if form is not None:
-            walls.append(row)
-            slopes.append(form.coefficients[0] if cut.holds > 0 else neg(form.coefficients[0]))
+        own.setdefault(number, []).append(row)
+    walls: list[tuple[int, ...]] = []
+    slopes: list[Term] = []
+    for number, cut in enumerate(level.cuts):
+        if cut.holds and cut.product is None and not cut.families and 1 <= len(own.get(number, ())) <= 2:
+            found = polynomial(cut.surface, level.variable)
+            if found is not None and len(found) == 1 + len(own[number]):
+                walls.append(tuple(own[number]))
+                slopes.append(found[0] if cut.holds > 0 else neg(found[0]))
     return (tuple(walls), function_of(tuple_(tuple(slopes)))) if len(walls) >= MANY_WALLS else ((), NOTHING)
 
 

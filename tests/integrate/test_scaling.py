@@ -56,6 +56,13 @@ def polygon(n: int) -> tuple[str, dict[str, float]]:
     return f"def f(t) integral ([-2, 2], [-2, 2]) {sides} d(x, y)", {"t": 0.7}
 
 
+def discs(n: int) -> tuple[str, dict[str, float]]:
+    """What discs around a middle share."""
+    middles = ((0.3 * math.cos(angle), 0.3 * math.sin(angle)) for angle in (2 * math.pi * k / n for k in range(n)))
+    sides = "*".join(f"[(x - ({a!r}))^2 + (y - ({b!r}))^2 < t^2]" for a, b in middles)
+    return f"def f(t) integral ([-2, 2], [-2, 2]) {sides} d(x, y)", {"t": 0.9}
+
+
 def builtins(n: int) -> tuple[str, dict[str, float]]:
     terms = " + ".join(f"sin({k}/{n}*x*t)*exp(-{k}/{n}*x)" for k in range(1, n + 1))
     return f"def f(t) integral [0, 1] ({terms})*[x < t] d(x)", {"t": 0.7}
@@ -68,7 +75,8 @@ def counted(call: Callable[[], Any]) -> tuple[int, int]:
 
 @pytest.mark.parametrize("made, sizes", [
     (conditions, (20, 40, 80)), (one_parameter, (160, 320, 640)), (own_parameters, (40, 80, 160)),
-    (triangles, (12, 24, 48)), (polygon, (16, 32, 64)), (builtins, (80, 160, 320)),  # below, fewer nodes do
+    (triangles, (12, 24, 48)), (polygon, (16, 32, 64)), (discs, (24, 48, 96)),
+    (builtins, (80, 160, 320)),  # below, fewer nodes do
 ])  # fmt: skip
 @pytest.mark.parametrize("gradient", [False, True])
 def test_twice_as_much(made: Made, sizes: tuple[int, ...], gradient: bool) -> None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from functools import lru_cache
 
+from potto.calculus.decomposition.circular_regions import Edges
 from potto.calculus.decomposition.critical import Critical, Within, folds, infinite, scattered, shadows
 from potto.calculus.decomposition.surface_cuts import RATIONAL, Cut, along, sections_in
 from potto.calculus.solving.enclosable import slope_of
@@ -32,12 +33,11 @@ def further_systems(
     yield from shadows(systems[:MOST_PAIRS], variable, lo, hi, roots, searched)
 
 
-def shadows_of_cuts(
-    cuts: Sequence[Cut], edges: Sequence[Cut], within: Within, further: frozenset[str]
-) -> Iterator[Shadow]:
-    """What the cuts of one variable leave in those further out. edges: further cuts, the sides of a polygon, whose
-    crossings with each other are its corners, which are looked for by themselves."""
-    for cut in cuts:
+def shadows_of_cuts(cuts: Sequence[Cut], edges: Edges, within: Within, further: frozenset[str]) -> Iterator[Shadow]:
+    """What the cuts of one variable leave in those further out. edges: further cuts, the lines and circles around a
+    region, whose crossings with each other are its corners, which are looked for by themselves."""
+    lines, circles = edges
+    for cut in (*cuts, *circles):
         yield from _at_bounds(cut, within, False)
         yield from _turning(cut, within, further)
     meeting, _ = crossing(cuts, within.variable, further)
@@ -45,7 +45,7 @@ def shadows_of_cuts(
         for second in meeting:
             if first is not second and first.key.digest < second.key.digest:
                 yield from _crossings(first, second, within, further)
-        for edge in edges:
+        for edge in (*lines, *circles):
             yield from _crossings(first, edge, within, further)
 
 

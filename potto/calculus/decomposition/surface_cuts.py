@@ -1,6 +1,6 @@
 """Surfaces as cuts of one variable: what they decide, what they are a product of, and where their roots are.
 
-Owns `Cut`, `WrittenSurface`, `Product` and `HalfPlanes`.
+Owns `Cut`, `WrittenSurface`, `Product` and `CircularRegion`.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class Cut(Struct, frozen=True):
     roots: closed-form sections, or None where they are found by numbers.
     center: nothing happens at it but that a smooth integrand may be concentrated there.
     holds: 1 or -1 where nothing is integrated but on that side of the canonical form, else 0.
-    corners: the half planes whose corners it stands for, instead of a surface.
+    corners: the region whose corners it stands for, instead of a surface.
     """
 
     surface: Term
@@ -62,7 +62,7 @@ class Cut(Struct, frozen=True):
     product: Product | None = None
     center: bool = False
     holds: int = 0
-    corners: HalfPlanes | None = None
+    corners: CircularRegion | None = None
 
     @property
     def decides(self) -> bool:
@@ -81,13 +81,18 @@ class Product(Struct, frozen=True):
     sign: int
 
 
-class HalfPlanes(Struct, frozen=True):
-    """An intersection of half planes a*x + b*y + c >= 0, x the variable that is cut, y the next one further in.
+class CircularRegion(Struct, frozen=True):
+    """An intersection of half planes a*x + b*y + c >= 0, of discs and their complements, q*(x^2 + y^2) + a*x + b*y + c
+    >= 0, x the variable that is cut, y the next one further in.
 
-    planes: a, b and c of each; the last two are those above the lower and below the upper bound of y.
+    lines: a, b and c of each; the last two are those above the lower and below the upper bound of y. circles: q, a, b
+    and c. further_in: y. surfaces: of circles, then of lines, as they were written: multiplied out they lose digits.
     """
 
-    planes: tuple[tuple[Term, Term, Term], ...]
+    lines: tuple[tuple[Term, ...], ...]
+    circles: tuple[tuple[Term, ...], ...]
+    further_in: str
+    surfaces: tuple[Term, ...]
 
 
 class Placed(Struct):

@@ -14,13 +14,13 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from potto.calculus.algebra.rational_form import settled
+from potto.calculus.decomposition.circular_regions import circular_region
 from potto.calculus.decomposition.critical import Critical, Within
-from potto.calculus.decomposition.half_planes import half_planes
 from potto.calculus.decomposition.projection import crossing, further_systems, shadows_of_cuts, shadows_of_roots
 from potto.calculus.decomposition.surface_cuts import (
     MOST_CENTERS,
+    CircularRegion,
     Cut,
-    HalfPlanes,
     Jump,
     Placed,
     along,
@@ -68,7 +68,7 @@ class _Pool(Struct):
     centers: dict[Term, None] = {}
     critical: dict[Critical, None] = {}
     edges: dict[Term, None] = {}
-    corners: list[HalfPlanes] = []
+    corners: list[CircularRegion] = []
 
     def find(self, finding: Finding) -> None:
         if finding.critical is not None:
@@ -177,15 +177,15 @@ def _level(
     decisive, others = [c for c in cuts if c.decides], [c for c in cuts if not c.decides]
     further = frozenset(pool.variables[: pool.variables.index(variable)])
     within = Within(variable, *bounds)
-    region, sides = half_planes(decisive, within, further)
-    alone = [cut for cut in decisive if cut not in sides]
+    region, (lines, circles) = circular_region(decisive, within, further)
+    alone = [cut for cut in decisive if cut not in lines and cut not in circles]
     complete = len(others) <= MOST_CUTS and crossing((*alone, *others), variable, further)[1]
     cuts = (*decisive, *others[:MOST_CUTS])
     (here, systems), edges = pool.take_points(variable), pool.take_edges(variable)
     own = None if over is None else cut_along(over.surface, variable)
     if not last:
         if over is None or own is None:
-            shadows = shadows_of_cuts((*alone, *others[:MOST_CUTS]), sides, within, further)
+            shadows = shadows_of_cuts((*alone, *others[:MOST_CUTS]), (lines, circles), within, further)
         else:
             shadows = shadows_of_roots(own, cuts, within, further, len(over.shares) == 1)
         for shadow in shadows:

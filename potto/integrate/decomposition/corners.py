@@ -1,8 +1,9 @@
-"""The corners of an intersection of half planes, and the edges of a range that is one of half lines.
+"""The corners of regions of half planes and discs, and the edges of a range that is an intersection of such.
 
-Owns `corner_rows` and `within_walls`. What is integrated is 0 outside of such a region, so that lines that cross there
-leave nothing: of n^2/2 crossings only the corners count, n at the most. Each line is clipped by all others (Cyrus and
-Beck 1978), which takes n^2 sums and products, and no formula. Whatever rounding does not settle counts.
+Owns `corner_rows` and `within_walls`. What is integrated is 0 outside of such a region, so that lines and circles that
+cross there leave nothing: of n^2/2 crossings the corners count alone. Each line is clipped by all others (Cyrus and
+Beck 1978), which takes n^2 sums and products, and no formula; where a circle takes part, crossings are held against all
+the others (`circle_corners`). Whatever rounding does not settle counts.
 """
 
 from __future__ import annotations
@@ -16,17 +17,16 @@ from msgspec.structs import replace
 
 from potto.core.terms import Term
 from potto.integrate.columns import distinct, side_by_side
+from potto.integrate.decomposition.circle_corners import BESIDE, CLEAR, circle_corners, moving
 from potto.integrate.decomposition.meetings import Row, as_array, tangents
 from potto.integrate.events import Unsearched
 from potto.integrate.levels import LevelPlan
 from potto.integrate.rules.gauss import EPS
 from potto.kernels.cells import Array, Cell, Ints, Value
 
-BESIDE = 2.0**-24  # of its size: how far outside of the region a place still counts
 ROUNDED = 2 * EPS  # of the sizes of its summands: how far off a sum of products is
 FINEST = 4 * EPS**2  # the same with what rounding took from each product
 SPLITS = 2.0**27 + 1
-CLEAR = 16 * EPS  # the same where lines are clipped
 MOST_NUMBERS = 1 << 18  # that are clipped at once
 
 
@@ -38,6 +38,12 @@ class _Lines(Struct, frozen=True):
     e: Array
     t: Array
     et: Array
+
+    def in_order(self) -> _Lines:
+        """The same with bounds that are reversed turned round."""
+        turned = np.ones((self.v.shape[1], self.v.shape[2]))
+        turned[-2:] = np.where(self.v[2, -2] + self.v[2, -1] < 0, -1.0, 1.0)
+        return _Lines(self.v * turned, self.e, self.t * turned, self.et)
 
     def crossings(self, p: Ints, q: Ints, member: Ints) -> tuple[Array, Array, Array, Array]:
         """Where lines p and q of members meet along x: places (P,), how far off, speeds (k, P), how far off these."""
@@ -88,36 +94,44 @@ def _doubt(a: Sequence[Array], b: Sequence[Array]) -> Array:
 
 
 def corner_rows(level: LevelPlan, env: dict[str, Value], batch: int, machine: Any) -> list[Row]:
-    """The cuts of one variable at corners of half planes."""
+    """The cuts of one variable at the corners of regions."""
     rows: list[Row] = []
-    for number, function in level.corners:
-        values = machine.tracking().evaluate(function, {n: env[n] for n in function.params}, None)
-        lines = _lines(values, batch, machine.directions)
-        unknown = ~np.isfinite(lines.v[:, :-2]).all(axis=(0, 1))
+    for region in level.corners:
+        values = machine.tracking().evaluate(region.numbers, {n: env[n] for n in region.numbers.params}, None)
+        numbers = _numbers(values, batch, machine.directions)
+        unknown = ~np.isfinite(numbers[0][: 3 * region.lines - 6]).all(axis=0)
         if unknown.any():
             machine.note(Unsearched(level.variable), np.nonzero(unknown)[0])
+        lines = _Lines(*(_apart(of[..., : 3 * region.lines, :], 3) for of in numbers)).in_order()
         first, second, owner = _corners(lines)
-        x, e, t, et = lines.crossings(first, second, owner)
+        found = [(owner, *lines.crossings(first, second, owner))]
+        if numbers[0].shape[0] > 3 * region.lines:
+            circles, doubt = (_apart(of[..., 3 * region.lines :, :], 4) for of in numbers[:2])
+            pairs = circle_corners((lines.v, lines.e), (circles, doubt))
+            found.append(moving(region, level.variable, env, *pairs, machine))
+        owner, x, e, t, et = (np.concatenate(of, axis=-1) for of in zip(*found, strict=True))
         order = np.lexsort((x, owner))
         x, e, t, et = (side_by_side(owner[order], of[..., order], batch, gap)
                        for of, gap in ((x, np.nan), (e, 0.0), (t, 0.0), (et, 0.0)))  # fmt: skip
-        rows += [Row(x[i], tuple(t[:, i]), number, False, e[i], tuple(et[:, i])) for i in range(x.shape[0])]
+        rows += [Row(x[i], tuple(t[:, i]), region.cut, False, e[i], tuple(et[:, i])) for i in range(x.shape[0])]
     return rows
 
 
-def _lines(values: Value, batch: int, directions: int) -> _Lines:
-    """The half planes of a batch."""
+def _numbers(values: Value, batch: int, directions: int) -> tuple[Array, Array, Array, Array]:
+    """Numbers of a batch (n, B), how far off they are, their tangents (k, n, B), and how far off these are."""
     assert isinstance(values, tuple)
     cells = [cell for cell in values if isinstance(cell, Cell)]
     v = np.stack([as_array(cell.v, batch) for cell in cells])
     e = np.stack([as_array(0.0 if cell.e is None else np.abs(cell.e), batch) for cell in cells])
     t = np.stack([tangents(cell.t, batch, directions) for cell in cells], axis=1)
     et = np.abs(np.stack([tangents(cell.et, batch, directions) for cell in cells], axis=1))
-    v, e, t, et = (np.moveaxis(of.reshape(*of.shape[:-2], len(cells) // 3, 3, batch), -2, -3) for of in (v, e, t, et))
-    turned = np.where(v[2, -2] + v[2, -1] < 0, -1.0, 1.0)  # bounds that are reversed
-    for of in (v, t):
-        of[..., -2:, :] = of[..., -2:, :] * turned
-    return _Lines(v, e, t, et)
+    return v, e, t, et
+
+
+def _apart(of: Array, each: int) -> Array:
+    """Numbers (..., n, B) of lines or circles: (..., each, n/each, B)."""
+    *outer, count, batch = of.shape
+    return np.moveaxis(of.reshape(*outer, count // each, each, batch), -2, -3)
 
 
 def _corners(lines: _Lines) -> tuple[Ints, Ints, Ints]:
@@ -126,7 +140,9 @@ def _corners(lines: _Lines) -> tuple[Ints, Ints, Ints]:
     with np.errstate(all="ignore"):
         size = np.hypot(lines.v[0], lines.v[1])
         step = max(1, MOST_NUMBERS // size.size)
-        parts = [_clipped(lines, size, np.arange(i, min(i + step, count - 2))) for i in range(0, count - 2, step)]
+        parts = [
+            _clipped(lines, size, np.arange(i, min(i + step, count - 2))) for i in range(0, max(count - 2, 1), step)
+        ]
     one, other, owner = (np.concatenate(of) for of in zip(*parts, strict=True))
     pairs = distinct((np.minimum(one, other) * count + np.maximum(one, other)) * batch + owner)
     return pairs // (count * batch), pairs // batch % count, pairs % batch
@@ -170,19 +186,25 @@ def within_walls(
     slopes = machine.with_directions(0).evaluate(level.slopes, {n: env[n] for n in level.slopes.params}, None)
     least: Any = -np.inf
     most: Any = np.inf
-    for row, slope in zip((rows[i] for i in level.walls), slopes, strict=True):
-        if level.level.cuts[row.cut].surface is face:
+    for wall, slope in zip(level.walls, slopes, strict=True):
+        if level.level.cuts[rows[wall[0]].cut].surface is face:
             continue
-        with np.errstate(invalid="ignore"):
-            wide = BESIDE * np.abs(row.x) + (0.0 if row.e is None else row.e)
-            known = np.isfinite(row.x) & np.isfinite(wide)
-            least = np.where(known & (slope.v > 0), np.maximum(least, row.x - wide), least)
-            most = np.where(known & (slope.v < 0), np.minimum(most, row.x + wide), most)
+        ends = [(rows[i].x, beside(rows[i])) for i in wall]
+        known = np.logical_and.reduce([np.isfinite(x) & np.isfinite(wide) for x, wide in ends])
+        low = np.minimum.reduce([x - wide for x, wide in ends])
+        high = np.maximum.reduce([x + wide for x, wide in ends])
+        above, below = (slope.v > 0, slope.v < 0) if len(wall) == 1 else (slope.v < 0, slope.v < 0)
+        least = np.where(known & above, np.maximum(least, low), least)
+        most = np.where(known & below, np.minimum(most, high), most)
     found = list(rows)
-    for i in level.walls:
-        x = rows[i].x
-        beside = BESIDE * np.abs(x) + (0.0 if rows[i].e is None else rows[i].e)
-        beyond = (x + beside < least) | (x - beside > most)
+    for i in (i for wall in level.walls for i in wall):
+        x, wide = rows[i].x, beside(rows[i])
+        beyond = (x + wide < least) | (x - wide > most)
         if np.any(beyond):
             found[i] = replace(rows[i], x=np.where(beyond, np.nan, as_array(x, batch)))
     return found
+
+
+def beside(row: Row) -> Any:
+    """How far beside a cut another one still counts."""
+    return BESIDE * np.abs(row.x) + (0.0 if row.e is None else row.e)
