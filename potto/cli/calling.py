@@ -41,7 +41,7 @@ def from_file(text: str) -> str:
 
 
 def _only(whole: str, path: str) -> str:
-    """The one column of a table that has no other."""
+    """The one column of a table that has no other, nor one that was left out as it lacks values: that may be meant."""
     from pathlib import Path
 
     from potto.data.files import read, shape_of
@@ -49,7 +49,9 @@ def _only(whole: str, path: str) -> str:
 
     content = read(Path(path))
     shape = shape_of(Path(path), content) if isinstance(content, bytes) else None
-    return f"({whole}).{shape.fields[0][0]}" if isinstance(shape, RecordColumns) and len(shape.fields) == 1 else whole
+    if isinstance(shape, RecordColumns) and len(shape.fields) == 1 and not shape.gaps:
+        return f"({whole}).{shape.fields[0][0]}"
+    return whole
 
 
 def add_set(parser: argparse.ArgumentParser) -> None:

@@ -30,6 +30,7 @@ def summary(value: Value) -> str:
         shown = [f"{name} {_within(field)}" for name, field in value.fields[:_MOST]]
         more = len(value.fields) - len(shown)
         left_out = [f"without {', '.join(value.texts)}: no numbers"] if value.texts else []
+        left_out += [f"without {name}: no value in line {line}" for name, line in value.gaps]
         return "; ".join([*shown, *([f"and {more} more"] if more else []), *left_out])
     if not isinstance(value, NumberArray):
         return _short(value)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import csv
 import re
 from array import array
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import chain, islice
 from math import isfinite
 
@@ -60,13 +60,16 @@ def separated(text: str, tabs: bool) -> NumberArray | Table:
     plain = '"' not in text and "_" not in body and body.isascii()
     columns = _fast(body.replace(",", ".").split("\n") if comma else kept, layout) if plain and kept else None
     texts: frozenset[int] = frozenset()
+    gaps: dict[int, int] = {}
     if columns is None:
         texts = _of_texts(lines, layout)
-        columns = _careful(lines, layout, texts)
-    return _value(layout, columns, texts)
+        columns, gaps = _careful(lines, layout, texts)
+    return _value(layout, columns, texts, gaps)
 
 
-def _value(layout: _Layout, columns: Sequence[array[float]], texts: frozenset[int]) -> NumberArray | Table:
+def _value(
+    layout: _Layout, columns: Sequence[array[float]], texts: frozenset[int], gaps: Mapping[int, int]
+) -> NumberArray | Table:
     length = max(map(len, columns))
     if not length:
         raise malformed("the file has a header and no rows", hint="a table has numbers in rows below its header")
@@ -75,9 +78,11 @@ def _value(layout: _Layout, columns: Sequence[array[float]], texts: frozenset[in
         kept = (
             (name, NumberArray((length,), RealNumber(), columns[at]))
             for at, name in enumerate(names)
-            if at not in texts
+            if at not in texts and at not in gaps
         )
-        return Table(tuple(kept), tuple(names[at] for at in sorted(texts) if layout.names[at].strip()))
+        named = [at for at in range(layout.width) if layout.names[at].strip()]
+        lacking = tuple((names[at], gaps[at]) for at in named if at in gaps)
+        return Table(tuple(kept), tuple(names[at] for at in named if at in texts), lacking)
     if layout.width == 1:
         return NumberArray((length,), RealNumber(), columns[0])
     flat = array("d", bytes(8 * length * layout.width))
@@ -215,17 +220,23 @@ def _of_texts(lines: Sequence[str], layout: _Layout) -> frozenset[int]:
     return frozenset(found) if len(found) < layout.width else frozenset()
 
 
-def _careful(lines: Sequence[str], layout: _Layout, texts: frozenset[int]) -> list[array[float]]:
-    """The columns, those of texts empty."""
-    columns = [array("d") for _ in range(layout.width)]
+def _careful(
+    lines: Sequence[str], layout: _Layout, texts: frozenset[int], strict: bool = False
+) -> tuple[list[array[float]], dict[int, int]]:
+    """The columns, those of texts empty, and which of them lack values, with the first line without one: what nobody
+    reads may have gaps. strict: nothing may; so it is without names to read by, and where every column has some."""
+    columns, gaps = [array("d") for _ in range(layout.width)], dict[int, int]()
+    strict = strict or not layout.names
     for row, record in islice(_records(lines, layout.delimiter), bool(layout.names), None):
         if len(record) != layout.width:
             raise _ragged(layout, row, len(record))
         for at, (column, text) in enumerate(zip(columns, record)):
-            if at in texts:
-                continue
-            column.append(_number(layout, row, at, text.strip(), lines[row - 1]))
-    return columns
+            if not strict and at not in texts and text.strip().lower() in MISSING:
+                gaps.setdefault(at, row)
+            if at not in texts and at not in gaps:
+                column.append(_number(layout, row, at, text.strip(), lines[row - 1]))
+    full = layout.width - len(texts) - len(gaps)
+    return (columns, gaps) if full or not gaps else _careful(lines, layout, texts, strict=True)
 
 
 def _ragged(layout: _Layout, row: int, length: int) -> DataRefused:

@@ -41,10 +41,12 @@ class Sizes(Struct, frozen=True):
 
 class RecordColumns(Struct, frozen=True):
     """A record: names, which are identifiers and differ, and what stands under them. texts: the names of columns that
-    were left out, since no value in them is a number."""
+    were left out, since no value in them is a number; gaps: of those that were since they lack values, each with the
+    first line of the file that has none."""
 
     fields: tuple[tuple[str, Shape], ...]
     texts: tuple[str, ...] = ()
+    gaps: tuple[tuple[str, int], ...] = ()
 
 
 Shape = RealNumber | Sizes | RecordColumns
@@ -79,10 +81,11 @@ class NumberArray(Struct, frozen=True, eq=False, dict=True):
 
 
 class Table(Struct, frozen=True, eq=False):
-    """A record of arrays, numbers and records, in the order of the file. texts: as in `RecordColumns`."""
+    """A record of arrays, numbers and records, in the order of the file. texts, gaps: as in `RecordColumns`."""
 
     fields: tuple[tuple[str, Value], ...]
     texts: tuple[str, ...] = ()
+    gaps: tuple[tuple[str, int], ...] = ()
 
     def __getitem__(self, path: str) -> Value:
         """What stands under a name; under `camera.focal`, in the record that stands under `camera`."""
@@ -97,7 +100,7 @@ Value = float | NumberArray | Table
 def shape(value: Value) -> Shape:
     """The shape of a value."""
     if isinstance(value, Table):
-        return RecordColumns(tuple((name, shape(field)) for name, field in value.fields), value.texts)
+        return RecordColumns(tuple((name, shape(field)) for name, field in value.fields), value.texts, value.gaps)
     return Sizes(value.dimensions, value.item) if isinstance(value, NumberArray) else RealNumber()
 
 

@@ -43,7 +43,7 @@ def type_of(shape: Shape, path: str, name: str = "") -> Type:
     the file's."""
     if isinstance(shape, RecordColumns):
         name = name or path.replace("\\", "/").rpartition("/")[2]
-        record = RecordName(path, name, tuple(field for field, _ in shape.fields), shape.texts)
+        record = RecordName(path, name, tuple(field for field, _ in shape.fields), shape.texts, shape.gaps)
         items = (type_of(item, path, f"{name}{SEPARATOR}{field}") for field, item in shape.fields)
         return TupleOf(tuple(items), record=record)
     if not isinstance(shape, Sizes):

@@ -123,6 +123,9 @@ def _columns(actual: Type, expected: Type, expr: nodes.Expr) -> str:
     item = resolve(expected.item) if isinstance(expected, ArrayOf) else expected
     if isinstance(item, TupleOf) and item.record is not None and _is_table(actual):
         missing = [f"`{field}`" for field in item.record.fields if field not in actual.record.fields]
+        gaps = [gap for gap in actual.record.gaps if gap[0] in item.record.fields]
+        if gaps:
+            return " and ".join(f"its column `{field}` has no value in line {line}" for field, line in gaps)
         if not missing:
             return f"write its rows, `{rows_of(actual, expected, print_expression(expr))}`"
         others = ", ".join(f"`{field}`" for field in actual.record.fields)
@@ -316,6 +319,10 @@ def no_field(
             f"only {'columns of ' if column else ''}numbers are loaded; write a number for each text, such as 0 and 1, "
         )
         help += "in another column" if column else "under another name"
+    if (line := dict(record.gaps).get(name)) is not None:
+        label = "lacks values"
+        message = f"the column `{name}` of `{record.name}` has no value in line {line}"
+        help = "leave rows that lack a value out of the file, or write a number there"
     return kinds.UNKNOWN_FIELD(span, message, label=label, related=related, help=help, suggestions=instead(span, near))
 
 
@@ -326,9 +333,11 @@ def _header(outside: Outside, record: RecordName, name: str) -> tuple[Related, .
         return ()
     for start, line in zip(text.line_starts, text.text.splitlines(), strict=False):
         if line.strip() and not line.lstrip().startswith("#"):
-            at = line.find(name) if name in record.texts else -1
+            at = line.find(name) if name in record.texts or name in dict(record.gaps) else -1
             span = Span(start, start + len(line.rstrip())) if at < 0 else Span(start + at, start + at + len(name))
             said = "its columns are named here" if at < 0 else "text in every row"
+            if at >= 0 and name not in record.texts:
+                said = f"no value in line {dict(record.gaps)[name]}"
             return (Related(span, said, record.file, ""),)
     return ()
 

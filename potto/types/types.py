@@ -37,13 +37,15 @@ class Dist:
 @value
 class RecordName:
     """Which record a tuple is: its definition, and the names of the fields. texts: the columns of a file of data that
-    are not among them, as they hold no numbers. dual: it is the dual of one that holds functions, whose fields are the
+    are not among them, as they hold no numbers; gaps: those that are not, as they lack values, with the first line
+    without one. dual: it is the dual of one that holds functions, whose fields are the
     duals of its."""
 
     file: str
     name: str
     fields: tuple[str, ...]
     texts: tuple[str, ...] = ()
+    gaps: tuple[tuple[str, int], ...] = ()
     dual: bool = False
 
     @property

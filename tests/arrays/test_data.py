@@ -95,8 +95,8 @@ def test_data_on_the_command_line(folder: Path, capsys: pytest.CaptureFixture[st
     ("name", "content", "place", "said"),
     [
         ("d.csv", "a,b\n1,2\n3, x\n", "d.csv:3:4", "expected a number"),
-        ("d.csv", 'a,b\n"1",2\n"35",\n', "d.csv:3:6", "expected a number"),
-        ("d.csv", "a;b\r\n1;2\r\n3;4\r\n-;5\r\n", "d.csv:4:1", "expected a number"),
+        ("d.csv", 'a,b\n"1",2\n"35",x\n', "d.csv:3:6", "expected a number"),
+        ("d.csv", "a;b\r\n1;2\r\n3;4\r\nx;5\r\n", "d.csv:4:1", "expected a number"),
         ("d.tsv", "a\tb\n1\t2\n# three\n3\n", "d.tsv:4:1", "expected 2 values"),
         ("d.json", '{"a": [1],\n  "b": [true]}', "d.json:2:3", "expected a number"),
     ],
@@ -134,6 +134,32 @@ def test_columns_of_text_and_places_beyond_the_end_are_shown_where_they_come_fro
     shown = capsys.readouterr().out
     assert f"error[{code}]" in shown
     assert all(place in shown for place in places)
+
+
+def test_a_column_that_nothing_reads_may_lack_values(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The mean of the heights is known, whatever is not of the weights; who asks for these is told the line."""
+    (folder / "people.csv").write_text("height,weight\n1.5,60\n1.75,\n2,90\n")
+    (folder / "means.po").write_text("""
+people = load("people.csv")
+def height(t) t*(sum h in people.height (h))/3
+""")
+    assert float(potto.load(folder / "means.po").height(1.0)) == 1.75
+    (folder / "heavy.po").write_text('people = load("people.csv")\nheavy = people.weight\n')
+    assert main(["check", str(folder / "heavy.po")]) == 1
+    shown = capsys.readouterr().out
+    assert "heavy.po:2:16: error[P0332]: the column `weight` of `people.csv` has no value in line 3" in shown
+    assert "people.csv:1:8" in shown
+    (folder / "rows.po").write_text("""
+record Person(height: Real, weight: Real)
+people = load("people.csv")
+def total(rows: [n] Person) sum p in rows (p.weight)
+all = total(people)
+""")
+    assert main(["check", str(folder / "rows.po")]) == 1
+    assert "its column `weight` has no value in line 3" in capsys.readouterr().out
+    table = folder / "people.csv"  # not the heights without a word: the weights may be meant
+    assert main(["eval", str(folder / "main.po"), "sum h in hs (h)", "--set", f"hs=@{table}"]) == 1
+    assert "this is a record `people.csv`" in capsys.readouterr().err
 
 
 def test_a_table_with_a_column_of_text_is_the_record_of_the_others(folder: Path) -> None:

@@ -113,7 +113,8 @@ def said(text: str, name: str = "t.csv") -> tuple[str, int | None, int | None, s
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
-        ("x,y\n1,2\n3,\n", ("P0803", 3, 2, "", "line 3, column `y`: there is no value")),
+        ("x,y\n1,\n,2\n", ("P0803", 2, 2, "", "line 2, column `y`: there is no value")),
+        ("x,y\n1,2,\n3,,\n", ("P0803", 2, None, "3", "line 2 has 3 values, but the header has 2 names")),
         ("x\n# c\n\n1\nNA\n", ("P0803", 5, 1, "NA", "line 5, column `x`: there is no value, only `NA`")),
         ("1\nnan\n", ("P0803", 2, 1, "nan", "line 2, column 1: there is no value, only `nan`")),
         ("NaN\n1\n", ("P0803", 1, 1, "NaN", "line 1, column 1: there is no value, only `NaN`")),
@@ -138,6 +139,22 @@ def said(text: str, name: str = "t.csv") -> tuple[str, int | None, int | None, s
 )  # fmt: skip
 def test_mistakes(text: str, expected: tuple[object, ...]) -> None:
     assert said(text) == expected
+
+
+@pytest.mark.parametrize(
+    ("text", "kept", "gaps"),
+    [
+        ("x,y\n1,2\n3,\n", {"x": [1.0, 3.0]}, (("y", 3),)),
+        ("x,y,z\n1,NA,2\n3,nan,\n", {"x": [1.0, 3.0]}, (("y", 2), ("z", 3))),
+        ("x;y\n;2.5\n;3.5\n", {"y": [2.5, 3.5]}, (("x", 2),)),
+        ("x;y;who\n1,5;;Ann\n2,5;4;Bob", {"x": [1.5, 2.5]}, (("y", 2),)),
+    ],
+)
+def test_columns_that_lack_values_are_left_out(text: str, kept: object, gaps: object) -> None:
+    assert plain("t.csv", text) == kept
+    found = separated(text, tabs=False)
+    assert isinstance(found, Table)
+    assert found.gaps == gaps
 
 
 def test_tabs_alone_are_a_row_without_values() -> None:
@@ -205,7 +222,7 @@ def test_columns_of_text_are_left_out(
     }
 
 
-@pytest.mark.parametrize("value", ["1,5", "1_000", "1 000", "'5", "٣", "1e400", "inf", ""])
+@pytest.mark.parametrize("value", ["1,5", "1_000", "1 000", "'5", "٣", "1e400", "inf"])
 def test_what_is_meant_as_a_number_is_not_left_out(value: str) -> None:
     assert isinstance(values_of(Path("a.csv"), f"x;y\n{value};2.5\n{value};3.5\n".encode()), DataMistake)
 
