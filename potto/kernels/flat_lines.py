@@ -24,7 +24,8 @@ from potto.kernels.written import Kernel
 
 SIGNS = {"add": "+", "sub": "-", "mul": "*", "div": "/"}
 RELATIONS = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!="}
-NAME = re.compile(r"\bx\d+\b")
+# Of a number here: a parameter, which stands in quotes, may be called the same.
+NAME = re.compile(r"(?<![\w.'\"])x\d+(?![\w'\"])")
 NONNEGATIVE = frozenset(("f_sqrt", "f_exp", "f_cosh"))
 
 

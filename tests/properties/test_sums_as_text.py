@@ -86,6 +86,22 @@ def test_all_bits_are_the_same(program: str, way: str, by_text: list[SumText]) -
     assert by_text
 
 
+@pytest.mark.parametrize("names", [("x0", "x7"), ("x2", "x3"), ("k0", "at0"), ("width", "block")])
+def test_parameters_may_be_called_as_numbers_of_the_text_are(
+    names: tuple[str, str], by_text: list[SumText], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A mesh has corners x0, y0, x1, ... No name tells the numbers apart."""
+
+    def gradient(a: str, b: str) -> list[str]:
+        text = f"def f({a}, {b}) integral ([0, 1], [0, 1]) exp({b}*x)*[x + y < {a}] d(x, y)"
+        call = potto.grad(potto.compile(text).f, (a, b))
+        return [told(call(0.4 + d, 0.7)) for d in (0.0, 1e-3, 2e-3)]
+
+    monkeypatch.setattr(sum_text, "TERM", 0.0)
+    assert gradient(*names) == gradient("a", "b")
+    assert by_text
+
+
 @pytest.mark.parametrize("number", range(examples(30, 400)))
 def test_random_programs_come_to_the_same(number: int, by_text: list[SumText]) -> None:
     pick = random.Random(number)
