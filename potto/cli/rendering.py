@@ -123,7 +123,7 @@ def _frames(
 ) -> tuple[str, Sequence[float]] | None:
     """The parameter that moves from frame to frame, and its values. Raises PottoError."""
     from potto.kernels.errors import wrong_call
-    from potto.python.arguments import evenly
+    from potto.python.arrays import evenly
 
     if options.over is None:
         return None

@@ -286,11 +286,6 @@ def _estimate(name: str, argument: Estimate, batch: Batch, to_function: ToFuncti
     return value_of(name, plain if (parts := answers_in(argument)) is None else parts, batch, to_function)
 
 
-def evenly(lo: float, hi: float, count: int) -> np.ndarray[Any, np.dtype[np.float64]]:
-    """So many numbers at equal distances, both ends included."""
-    return np.linspace(lo, hi, count)
-
-
 def _instead(argument: Any) -> str:
     """What to do with an argument that is none: of a library that differentiates, what makes a function one of its."""
     bridges = {"jax": ("JAX", "to_jax"), "jaxlib": ("JAX", "to_jax"), "torch": ("PyTorch", "to_torch")}

@@ -1,9 +1,9 @@
 """Arrays of Python as arrays of Potto: what a parameter's type says which axes of numpy's are.
 
-Owns `with_arrays`, `axes_of`, `over_batch`, `batch_shapes` and `shape_together`. A parameter `[n] Real` takes a numpy
-array, a column of a table or a list as one array, and the axes before those of the array are a batch; a parameter
-`Real` takes a numpy array as a batch. Until all batches are known, the parts of such an array have its axes first and
-then those of its own batch.
+Owns `with_arrays`, `axes_of`, `over_batch`, `batch_shapes`, `shape_together` and `evenly`. A parameter `[n] Real` takes
+a numpy array, a column of a table or a list as one array, and the axes before those of the array are a batch; a
+parameter `Real` takes a numpy array as a batch. Until all batches are known, the parts of such an array have its axes
+first and then those of its own batch.
 """
 
 from __future__ import annotations
@@ -308,3 +308,8 @@ def _agree(name: str, count: int, size: Type, sizes: Sizes) -> None:
             raise wrong_call(f"`{name}` has parts of one size, but is given {known + offset} and {count} elements")
         if known != count - offset:
             raise wrong_call(f"`{name}` has {known + offset} elements, as `{other}` says, and is given {count}")
+
+
+def evenly(lo: float, hi: float, count: int) -> np.ndarray[Any, np.dtype[np.float64]]:
+    """So many numbers at equal distances, both ends included."""
+    return np.linspace(lo, hi, count)

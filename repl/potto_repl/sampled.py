@@ -19,7 +19,7 @@ from potto.applications.pictures import Curve
 from potto.modules.builtins import is_builtin
 from potto.modules.free import free_references
 from potto.projects.settings import Settings, settings
-from potto.python.arguments import evenly
+from potto.python.arrays import evenly
 from potto.python.functions import Function
 from potto.runtime.answers.estimate import Estimate
 from potto.runtime.answers.printing import format_error
