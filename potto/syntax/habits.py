@@ -136,7 +136,7 @@ def _loop(stop: Stop) -> Diagnostic | None:
 
 
 def _bounds(stop: Stop) -> Diagnostic | None:
-    """`integral (0, 1)`, `integral(0, 1, f, x)`, `integral (x in [0, 1])`."""
+    """`integral (0, 1)`, `integral(0, 1, f, x)`, `integral (x in [0, 1])`, `integral (normal(0, 1))`."""
     opened = stop.opened
     if opened is None or opened.kind not in ("LPAR", "INTEGRAL"):
         return None
@@ -147,13 +147,22 @@ def _bounds(stop: Stop) -> Diagnostic | None:
         return kinds.UNEXPECTED(
             stop.at.span, "the bounds of an integral stand alone", help="write `integral [lo, hi] body d(x)`"
         )
-    if stop.before is None or stop.before.kind != "LPAR" or stop.at.kind not in ("NUMBER", "SIGN"):
+    if stop.before is None:
+        return None
+    if stop.before.kind == "NAME" and stop.at.text == "(":
+        return _without_variable(stop.before)
+    if stop.before.kind != "LPAR" or stop.at.kind not in ("NUMBER", "SIGN"):
         return None
     return kinds.UNFINISHED(
         Span(outer[-1].start, stop.at.end),
         "the bounds of an integral stand in brackets",
         help="write `integral [lo, hi] body d(x)`",
     )
+
+
+def _without_variable(measure: Token) -> Diagnostic:
+    help = f"write `integral (x ~ {measure.text}(…)) body d(x)`"
+    return kinds.UNFINISHED(measure.span, f"expected a variable and `~` before `{measure.text}`", help=help)
 
 
 def _sum(stop: Stop) -> Diagnostic | None:

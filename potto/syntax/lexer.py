@@ -174,7 +174,8 @@ class _Lexer:
         if _BOUNDS.match(self.text, end):
             return
         message = f"expected the bounds after `{word}`"
-        self.nesting.report(kinds.UNFINISHED(Span(start, end), message, help="write `integral [lo, hi] body d(x)`"))
+        help = "write `integral [lo, hi] body d(x)`, or `integral (x ~ normal(m, s)) body d(x)` for an expectation"
+        self.nesting.report(kinds.UNFINISHED(Span(start, end), message, help=help))
         self.tokens.append(Token("NOBOUNDS", "", end, end))
 
     def _in_head(self, before: Token) -> bool:

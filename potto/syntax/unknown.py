@@ -13,7 +13,7 @@ from potto.syntax.tokens import FIRST_NAME, PLAIN_OPERATOR
 
 _DATA = re.compile(r"\.(csv|tsv|npy|npz|png|jpe?g|json)$", re.IGNORECASE)
 _MEANT = {
-    "!": ("write `not`", "not"),
+    "!": ("write `not`; n! is `gamma(n + 1)`", "not"),
     "%": ("Potto has no remainder; `x - floor(x/n)*n` is one", ""),
     "|": ("write `abs(x)`, or `or` between conditions", "or"),
     "&": ("write `and` between conditions", "and"),

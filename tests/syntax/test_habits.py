@@ -72,6 +72,8 @@ def test_mathematics() -> None:
         #        ^^^^^^^^^^^^^^^^^^^^^^^ error[P0117]: the bounds of an integral come first
         def f(t) integral([0, t], 2*x, x)
         #        ^^^^^^^^ error[P0117]: an integral is not a call
+        def f(m) integral (normal(m, 1)) [x > 0] d(x)
+        #                  ^^^^^^ error[P0104]: expected a variable and `~` before `normal`
         def f(n) sum i = 1..n (i^2)
         #              ^ error[P0104]: expected `in` after the variable of `sum`
         def f(x) -> x^2
