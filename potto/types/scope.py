@@ -13,6 +13,7 @@ from functools import cache
 from typing import Literal
 
 from potto.diagnostics import Diagnostic, Related, Replacement, Suggestion
+from potto.measures import MEASURES
 from potto.modules.builtins import CONSTANTS, PROJECTIONS, SPECIALS, VECTORS, is_builtin
 from potto.modules.hints import called_here, elsewhere, known_elsewhere
 from potto.modules.lookup import DefinitionBinding, DefinitionTarget, find_module, meaning, preludes, resolve_module
@@ -162,15 +163,23 @@ def undefined(outside: Outside, scope: Iterable[str], node: nodes.Name) -> Diagn
             help="write `print(…)` at the top of a script, in a line of its own",
         )
     near = near_names(name, (*scope, *_near_at_top(outside.db, outside.file, name)))
-    help = known_elsewhere(name) or did_you_mean(near)
+    help = _as_measure(name) or known_elsewhere(name) or did_you_mean(near)
     module = elsewhere(outside.db, outside.file, name)
     if module is not None:
         help = f"the module `{module}` defines it: add `from {module} import {name}`"
-    meant = called_here(name) or (() if known_elsewhere(name) or module is not None else near)
+    told = bool(_as_measure(name) or known_elsewhere(name)) or module is not None
+    meant = called_here(name) or (() if told else near)
     return NOT_DEFINED(
         node.span, f"`{name}` is not defined", label="not defined here", help=help,
         suggestions=instead(node.span, meant),
     )  # fmt: skip
+
+
+def _as_measure(name: str) -> str:
+    """What to write where a measure stands for a number, or for a function."""
+    if name not in MEASURES:
+        return ""
+    return f"a measure stands among the bounds of an integral: `integral (x ~ {name}(…)) body d(x)`"
 
 
 def undefined_member(outside: Outside, scope: Scope, node: nodes.Member) -> Diagnostic | None:
