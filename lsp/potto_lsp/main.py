@@ -16,7 +16,6 @@ from potto_lsp import memory
 from potto_lsp.greeting import greet
 from potto_lsp.wire import Outbox, messages
 
-logger = logging.getLogger(__name__)
 SWITCH = 0.0002  # seconds; with Python's default of 5 ms, so long would a question wait for a busy thread
 
 

@@ -6,7 +6,6 @@ analysis must know follows as an edit.
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +14,6 @@ from potto_lsp.uris import to_key
 if TYPE_CHECKING:
     from potto_lsp.server import Server
 
-logger = logging.getLogger(__name__)
 Handler = Callable[["Server", Any], None]
 PATTERNS = ("**/*.{po,diffeo}", "**/potto.toml", "**/*.{csv,tsv,npy,npz,json,png,jpg,jpeg}")
 

@@ -19,6 +19,7 @@ Color = tuple[int, int, int]
 COLORS: tuple[Color, ...] = ((31, 119, 180), (214, 39, 40), (44, 160, 44), (148, 103, 189), (255, 127, 14))
 WHITE: Color = (255, 255, 255)
 FAR = 100.0  # times the least: a course that is drawn by its logarithm
+MOST_TICKS = 6  # of an axis
 ROUNDING = 1e-16  # of the largest value of a course: what lies below says nothing
 
 
@@ -234,9 +235,9 @@ def image_of(components: Sequence[Sequence[float]], columns: int, *, signed: boo
     return Image(tuple(map(tuple, rows)), low, high, signed and plain, map=colouring, ends=ends)
 
 
-def ticks(low: float, high: float, most: int = 6) -> list[float]:
-    """Round numbers from low to high, so many at the most: steps of 1, 2 or 5 times a power of ten."""
-    rough = (high - low) / most
+def ticks(low: float, high: float) -> list[float]:
+    """Round numbers from low to high, `MOST_TICKS` at the most: steps of 1, 2 or 5 times a power of ten."""
+    rough = (high - low) / MOST_TICKS
     power = 10.0 ** math.floor(math.log10(rough))
     step = power * next(m for m in (1, 2, 5, 10) if m * power >= rough * (1 - 1e-9))
     first = math.ceil(low / step - 1e-9)

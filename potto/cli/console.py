@@ -7,14 +7,13 @@ import os
 import sys
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any, Literal, TextIO
+from typing import TYPE_CHECKING, Any, TextIO
 
 from msgspec import Struct
 
 if TYPE_CHECKING:
     from potto.reports.render import Located, Palette, Sources
 
-Color = Literal["auto", "always", "never"]
 MOST_SHOWN = 50  # diagnostics of one command shown to a person
 
 

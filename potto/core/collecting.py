@@ -160,13 +160,13 @@ def product_of(node: Prim) -> Term:
     if not factors.coefficient:
         return ZERO
     merged = {base: _gathered(exponents) for base, exponents in factors.powers.items()}
-    if merged == factors.powers and factors.numbers < 2 and factors.levels < 2 and not _cancels(factors, node):
+    if merged == factors.powers and factors.numbers < 2 and factors.levels < 2 and not _cancels(node):
         return node
     written = _written(factors.coefficient, merged)
     return written if written is not node else node
 
 
-def _cancels(factors: _Factors, node: Prim) -> bool:
+def _cancels(node: Prim) -> bool:
     """Whether a number below the line, or a power of a product or of a power, can be written more simply."""
     if node.op == "pow":
         base = node.args[0]

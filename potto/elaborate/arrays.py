@@ -163,7 +163,6 @@ def _held(file: DataFile, shape: Shape, name: str) -> Term:
 
 # What goes through ranges and arrays
 
-Around = Callable[[Term], Term]
 Binder = Callable[[str, Term, Term, Term], Term]
 
 

@@ -49,7 +49,7 @@ def import_diagnostics(db: Database, file: str) -> tuple[Said, ...]:
     """Everything about the imports of a file, by the number of the import."""
     items = imports(db, file)
     found = [(number, said) for number, item in enumerate(items) for said in _check(db, file, item)]
-    found += _repeated(db, file, items)
+    found += _repeated(items)
     wrong = {number for number, said in found if said.severity == "error"}
     found += ((number, said) for number, said in _unused(db, file, items) if number not in wrong)
     if not any(said.code == CIRCULAR.code for _, said in found):
@@ -175,7 +175,7 @@ def _not_in_module(
     )
 
 
-def _repeated(db: Database, file: str, items: tuple[Importing, ...]) -> Iterator[Said]:
+def _repeated(items: tuple[Importing, ...]) -> Iterator[Said]:
     """Names that two imports bind."""
     seen: dict[str, ImportBinding] = {}
     for number, item in enumerate(items):

@@ -10,9 +10,8 @@ import difflib
 import itertools
 import os
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import partial
-from types import MappingProxyType
 from typing import Any
 
 from potto import store
@@ -35,7 +34,6 @@ from potto.types.types import Diffeo
 from potto.types.types import Function as FunctionType
 
 NOWHERE = Span(0, 0)
-NOTHING: Mapping[str, Any] = MappingProxyType({})
 _texts = itertools.count(1)
 # Modules of texts that import nothing, by folder, name and text: what a cell of a notebook that is run again need not
 # be checked for again.

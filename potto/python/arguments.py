@@ -346,7 +346,7 @@ def _complaint(name: str, argument: Any, type: Type, own: Type | None) -> str | 
         case _ if own is not None:
             return "not a function" if isinstance(type, Real | Dist | TupleOf | ArrayOf) else None
         case TupleOf(items, dual):
-            return _tuple_misfit(name, argument, items, dual)
+            return _tuple_misfit(argument, items, dual)
         case ArrayOf():
             fits = isinstance(argument, list | np.ndarray | Estimate | Rows)
             more = ": `list(…)` makes one of it" if isinstance(argument, tuple | range | Set | Iterator) else ""
@@ -363,7 +363,7 @@ def is_dual(type: Type) -> bool:
     return isinstance(type, TupleOf) and (type.dual or all(is_dual(resolve(item)) for item in type.items))
 
 
-def _tuple_misfit(name: str, argument: Any, items: tuple[Type, ...], dual: bool) -> str | None:
+def _tuple_misfit(argument: Any, items: tuple[Type, ...], dual: bool) -> str | None:
     if dual and isinstance(items[0], ArrayOf) and isinstance(argument, list | np.ndarray | Rows):
         return None  # an array without tangents
     if dual and not isinstance(argument, tuple | list | Mapping):

@@ -52,10 +52,10 @@ def stub(world: World, file: str) -> str:
             classes.append(_function(f"_{defined}", type, doc))
             members.append(f"    {defined}: _{defined}")
         elif not isinstance(type, Unknown):
-            members += [f"    {defined}: Estimate", *([_quoted(doc, 4)] if doc else [])]
+            members += [f"    {defined}: Estimate", *([_quoted(doc)] if doc else [])]
     head = HEAD.format(title=os.path.basename(file), module=_word(leaf), name=name)
     doc = comment_of(world, file, None)
-    body = [*([_quoted(doc, 4)] if doc else []), *members] or ["    ..."]
+    body = [*([_quoted(doc)] if doc else []), *members] or ["    ..."]
     return "\n\n".join([head.rstrip(), *classes, "\n".join([f"class {name}(Module):", *body])]) + "\n"
 
 
@@ -77,7 +77,7 @@ def _word(text: str) -> str:
 def _function(name: str, type: Function | Diffeo, doc: str | None) -> str:
     """The class of a function: called with all groups, or with the first ones, for a function of the others."""
     groups = groups_of(type)
-    lines = [f"class {name}(Function):", _quoted(f"`{format_type(type)}`" + (f"\n\n{doc}" if doc else ""), 4)]
+    lines = [f"class {name}(Function):", _quoted(f"`{format_type(type)}`" + (f"\n\n{doc}" if doc else ""))]
     calls = [([*sum(groups[:count], ())], "Function" if count < len(groups) else "Estimate")
              for count in range(1, len(groups) + 1)] or [([], "Estimate")]  # fmt: skip
     for parameters, answer in calls:
@@ -112,9 +112,9 @@ def _annotation(type: Type) -> str:
             return "Any"
 
 
-def _quoted(text: str, indent: int) -> str:
+def _quoted(text: str) -> str:
     """A docstring."""
-    blanks = " " * indent
+    blanks = "    "
     lines = text.replace("\\", "\\\\").replace('"""', '\\"\\"\\"').split("\n")
     if len(lines) == 1 and not lines[0].endswith('"'):
         return f'{blanks}"""{lines[0]}"""'

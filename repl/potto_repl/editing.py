@@ -50,12 +50,12 @@ def indentation(text: str) -> str:
     own = re.match(r"[ \t]*", line)
     blanks = own[0] if own is not None else ""
     code = line.split("#")[0].rstrip()
-    if _opens_block(text, code) or (_OPENS.search(code) and code):
+    if _opens_block(code) or (_OPENS.search(code) and code):
         return blanks + " " * INDENT
     return blanks
 
 
-def _opens_block(text: str, line: str) -> bool:
+def _opens_block(line: str) -> bool:
     """Whether a line is a head whose body is still to come."""
     if re.match(r"\s*for\b", line):
         return line.endswith(":")

@@ -98,12 +98,12 @@ def _filled(group: tuple[Parameter, ...], arguments: tuple[nodes.Argument, ...])
     return filled
 
 
-def split_items(text: str, separator: str = ",") -> list[str]:
-    """The items of a list that is separated outside of brackets."""
+def split_items(text: str) -> list[str]:
+    """The items between commas that stand outside of brackets."""
     items, depth, start = [], 0, 0
     for place, char in enumerate(text):
         depth += (char in "([{") - (char in ")]}")
-        if char == separator and depth == 0:
+        if char == "," and depth == 0:
             items.append(text[start:place].strip())
             start = place + 1
     return [item for item in (*items, text[start:].strip()) if item]

@@ -104,11 +104,9 @@ def _enlarged(node: Prim, relative: float) -> float:
             return _AMPLIFIED
 
 
-def points(
-    names: Sequence[str], box: Mapping[str, tuple[float, float]], count: int, seed: int = 1
-) -> Iterator[dict[str, float]]:
+def points(names: Sequence[str], box: Mapping[str, tuple[float, float]], count: int) -> Iterator[dict[str, float]]:
     """Random points, the same ones each time; a variable without bounds between -3 and 3."""
-    source = random.Random(seed)
+    source = random.Random(1)
     for _ in range(count):
         yield {n: source.uniform(*_finite(box.get(n, (-3.0, 3.0)))) for n in names}
 

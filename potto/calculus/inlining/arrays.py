@@ -1,6 +1,6 @@
 """Arrays taken out of integrands, so that what integrates sees numbers alone.
 
-Owns `touching`, `inlined`, `summands`, `loops`, `unrolled` and `bound`. What reads an array at a plain place is found
+Owns `inlined`, `summands`, `loops`, `unrolled` and `bound`. What reads an array at a plain place is found
 once, beside the integral, under a name of its own. A sum under an integral becomes a sum of integrals wherever the
 integrand is linear in it; other sums, folds and arrays that vary with a variable of integration are written out.
 """
@@ -64,11 +64,6 @@ MOST_STEPS = 1000  # of a loop that is written out
 
 Loop = tuple[str, Term, Term]  # the index of a sum, from, to
 Summand = tuple[tuple[Loop, ...], Term]
-
-
-def touching(term: Term) -> bool:
-    """Whether a term itself has to do with arrays; what it calls is another matter."""
-    return any(isinstance(node, ARRAYS) for node in postorder(term))
 
 
 # Calls

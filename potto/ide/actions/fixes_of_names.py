@@ -57,7 +57,7 @@ def _import(place: At, target: str, name: str) -> Change | None:
 
 def _define(place: At, chunk: ChunkAt, span: Span, name: str) -> Change:
     """A definition above, as the name is used: with parameters if it is called."""
-    groups = _groups(chunk, chunk.parsed(place.db).item, span.shift(-chunk.start))
+    groups = _groups(chunk.parsed(place.db).item, span.shift(-chunk.start))
     if groups:
         head = "".join("(" + ", ".join(group) + ")" for group in groups)
         text = f"def {name}{head}\n    0"
@@ -68,7 +68,7 @@ def _define(place: At, chunk: ChunkAt, span: Span, name: str) -> Change:
     return one_file(place.file, Edit(Span(chunk.start, chunk.start), text))
 
 
-def _groups(chunk: ChunkAt, item: nodes.Item | None, span: Span) -> list[list[str]]:
+def _groups(item: nodes.Item | None, span: Span) -> list[list[str]]:
     """Names for the parameters that the calls of a name ask for, outermost call last."""
     calls: dict[Span, nodes.Apply] = {}
     for node in () if item is None else walk(item):

@@ -67,7 +67,7 @@ def symbol_markdown(db: Database, file: str, symbol: Symbol) -> str:
     """What there is to say about a symbol, as seen from a file."""
     match symbol:
         case LocalSymbol():
-            return local_markdown(db, symbol, file)
+            return local_markdown(db, symbol)
         case DefinitionSymbol(where, name):
             text = definition_markdown(db, where, name)
             return text if where == file else f"{text}\n\n*{os.path.basename(where)}*"

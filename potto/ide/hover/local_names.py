@@ -38,7 +38,7 @@ TITLES = {
 }
 
 
-def local_markdown(db: Database, symbol: LocalSymbol, file: str) -> str:
+def local_markdown(db: Database, symbol: LocalSymbol) -> str:
     """What there is to say about a local name."""
     chunk, binder = symbol.chunk, symbol.binder
     name = owner(db, chunk)

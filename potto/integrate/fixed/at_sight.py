@@ -63,17 +63,6 @@ class _Rectangle(Struct, frozen=True):
         return self.ends[name][1] - self.ends[name][0]
 
 
-class _Section(Struct, frozen=True):
-    """Nodes (n,) of the outer variable between two places, with weights; between which places (n,) the inner one runs,
-    and on which side of the surface. off: how far the place on the surface may be off."""
-
-    x: Array
-    weights: Array
-    low: Array
-    high: Array
-    above: bool
-
-
 def worth_a_look(body: Term) -> bool:
     """Whether surfaces have so many parts that what follows from them for all parameters takes longer to find."""
     return len(postorder(*_surfaces(body))) > MANY_PARTS

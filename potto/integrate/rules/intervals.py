@@ -26,7 +26,6 @@ from potto.primitives.walking import Domain
 Interval = tuple[Any, Any]  # lower and upper bounds, numbers or arrays
 
 ANYTHING: Interval = (-np.inf, np.inf)
-NOWHERE: Interval = (np.nan, np.nan)  # of a term that has no value on a box
 ROUNDING = 4 * EPS  # of one operation, functions of libraries included, relative
 
 

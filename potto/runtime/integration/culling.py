@@ -190,7 +190,7 @@ def _summed(cell: Cell, at: Ints, size: int, shape: tuple[int, ...]) -> Cell:
         if part is None:
             return None
         if isinstance(part, Node):
-            return _total(part, at, size, shape)
+            return _total(part, at, shape)
         found = np.bincount(at, np.broadcast_to(part, at.shape), size)
         return found.reshape(shape) if shape else float(found[0])
 
@@ -198,7 +198,7 @@ def _summed(cell: Cell, at: Ints, size: int, shape: tuple[int, ...]) -> Cell:
     return Cell(total(cell.v), total(off), tuple(map(total, cell.t)), tuple(map(total, cell.et)))
 
 
-def _total(node: Node, at: Ints, size: int, shape: tuple[int, ...]) -> Node:
+def _total(node: Node, at: Ints, shape: tuple[int, ...]) -> Node:
     """Members of a node added up at places; going back, each gets what its place has."""
     node = np.broadcast_to(node, at.shape)  # type: ignore[assignment]
 
