@@ -10,6 +10,7 @@ import pytest
 from how_many import examples
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from polygons import Polygon, area, in_square
 
 import potto
 from potto.__main__ import main
@@ -24,36 +25,13 @@ def pixel(mesh: [n] ((Real, Real), (Real, Real), (Real, Real)), grey: [n] Real, 
 def loss(mesh: [n] ((Real, Real), (Real, Real), (Real, Real)), grey: [n] Real, k)
     sum i in 0..k-1, j in 0..k-1 ((pixel(mesh, grey, i/k, j/k, 1/k)*k^2 - 0.5)^2)
 """
-Point = tuple[Fraction, Fraction]
 
 
-def clipped(polygon: list[Point], axis: int, bound: Fraction, sign: int) -> list[Point]:
-    """A polygon, as far as it lies on one side of a line along an axis (Sutherland and Hodgman 1974)."""
-    out: list[Point] = []
-    for a, b in zip(polygon, polygon[1:] + polygon[:1], strict=True):
-        u, v = sign * (a[axis] - bound), sign * (b[axis] - bound)
-        if u >= 0:
-            out.append(a)
-        if u * v < 0:
-            s = u / (u - v)
-            out.append((a[0] + s * (b[0] - a[0]), a[1] + s * (b[1] - a[1])))
-    return out
-
-
-def covered(triangle: list[Point], x: Fraction, y: Fraction, h: Fraction) -> Fraction:
-    """The area of a triangle in a square."""
-    polygon = triangle
-    for axis, low in ((0, x), (1, y)):
-        polygon = clipped(clipped(polygon, axis, low, 1), axis, low + h, -1)
-    edges = zip(polygon, polygon[1:] + polygon[:1], strict=True) if polygon else ()
-    return abs(sum((a[0] * b[1] - b[0] * a[1] for a, b in edges), Fraction(0))) / 2
-
-
-def exact_loss(mesh: list[list[Point]], grey: list[Fraction], k: int) -> Fraction:
+def exact_loss(mesh: list[Polygon], grey: list[Fraction], k: int) -> Fraction:
     h, total = Fraction(1, k), Fraction(0)
     for i in range(k):
         for j in range(k):
-            value = sum(g * covered(t, i * h, j * h, h) for t, g in zip(mesh, grey, strict=True))
+            value = sum(g * abs(area(in_square(t, i * h, j * h, h))) for t, g in zip(mesh, grey, strict=True))
             total += (value * k**2 - Fraction(1, 2)) ** 2
     return total
 

@@ -5,14 +5,11 @@ Against closed forms at 40 digits, by quadrature and by samples.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import pytest
+from chances import Cdf, check_chances
 from mpmath import mp
 
 import potto
-
-Cdf = Callable[..., mp.mpf]
 
 
 def normal(t: mp.mpf, m: mp.mpf, s: mp.mpf) -> mp.mpf:
@@ -56,33 +53,10 @@ CASES: list[tuple[str, tuple[str, ...], Cdf, tuple[float, ...]]] = [
 ]
 
 
-def program(measure: str, names: tuple[str, ...]) -> potto.Module:
-    """The chance of what is below t, and its derivative by each parameter."""
-    every = ("t", *names)
-    lines = [f"def f({', '.join(every)}) integral (x ~ {measure}) [x < t] d(x)"]
-    for name in every:
-        moved = ", ".join(f"({n}, {int(n == name)})" for n in every)
-        lines.append(f"def d_{name}({', '.join(every)}) snd(deriv(f)({moved}))")
-    return potto.compile("\n".join(lines) + "\n")
-
-
 @pytest.mark.parametrize("method", ["quadrature", "mc", "qmc"])
 @pytest.mark.parametrize(("measure", "names", "cdf", "values"), CASES)
 def test_chances(measure: str, names: tuple[str, ...], cdf: Cdf, values: tuple[float, ...], method: str) -> None:
-    module = program(measure, names)
-    with mp.workdps(40), potto.settings(method=method, samples=20_000, seed=4):
-        exact = [mp.mpf(v) for v in values]
-        check(module.f(*values), cdf(*exact), method)
-        for place, name in enumerate(("t", *names)):
-            order = tuple(int(i == place) for i in range(len(values)))
-            check(getattr(module, f"d_{name}")(*values), mp.diff(cdf, tuple(exact), order), method)
-
-
-def check(found: potto.Estimate, wanted: mp.mpf, method: str) -> None:
-    off, room = abs(mp.mpf(float(found)) - wanted), 1e-14 * max(1, abs(wanted))
-    assert off <= (1 if method == "quadrature" else 5) * found.error + (room if method == "quadrature" else 1e-9)
-    if method == "quadrature":
-        assert off <= 1e-8 * max(1, abs(wanted)), (found, wanted)
+    check_chances(measure, names, cdf, values, method)
 
 
 def test_several_variables() -> None:

@@ -6,16 +6,14 @@ Derivatives by every parameter and by the place of the jump, by differences of t
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import pytest
+from chances import Cdf, check_chances
 from mpmath import mp
 
 import potto
-
-Cdf = Callable[..., mp.mpf]
 
 
 def beta(t: mp.mpf, a: mp.mpf, b: mp.mpf) -> mp.mpf:
@@ -60,45 +58,15 @@ CASES: list[tuple[str, tuple[str, ...], Cdf, tuple[float, ...]]] = [
 ]
 
 
-def program(measure: str, names: tuple[str, ...]) -> potto.Module:
-    """The chance of what is below t, and its derivative by each parameter."""
-    every = ("t", *names)
-    lines = [f"def f({', '.join(every)}) integral (x ~ {measure}) [x < t] d(x)"]
-    for name in every:
-        moved = ", ".join(f"({n}, {int(n == name)})" for n in every)
-        lines.append(f"def d_{name}({', '.join(every)}) snd(deriv(f)({moved}))")
-    return potto.compile("\n".join(lines) + "\n")
-
-
 @pytest.mark.parametrize(("measure", "names", "cdf", "values"), CASES)
 def test_by_quadrature(measure: str, names: tuple[str, ...], cdf: Cdf, values: tuple[float, ...]) -> None:
-    module = program(measure, names)
-    with mp.workdps(40):
-        exact = [mp.mpf(v) for v in values]
-        check(module.f(*values), cdf(*exact))
-        for place, name in enumerate(("t", *names)):
-            order = tuple(int(i == place) for i in range(len(values)))
-            check(getattr(module, f"d_{name}")(*values), mp.diff(cdf, tuple(exact), order), 1e-8)
-
-
-def check(found: potto.Estimate, wanted: mp.mpf, rel: float = 1e-9) -> None:
-    off = abs(mp.mpf(float(found)) - wanted)
-    assert off <= found.error + 1e-14 * max(1, abs(wanted)), (found, wanted)
-    assert off <= rel * max(1, abs(wanted)), (found, wanted)
+    check_chances(measure, names, cdf, values, "quadrature")
 
 
 @pytest.mark.parametrize("method", ["mc", "qmc"])
 @pytest.mark.parametrize(("measure", "names", "cdf", "values"), [c for c in CASES if c[3][1] != 200.0])
 def test_by_samples(measure: str, names: tuple[str, ...], cdf: Cdf, values: tuple[float, ...], method: str) -> None:
-    module = program(measure, names)
-    with mp.workdps(40), potto.settings(method=method, samples=20_000, seed=11):
-        exact = [mp.mpf(v) for v in values]
-        found = module.f(*values)
-        assert abs(mp.mpf(float(found)) - cdf(*exact)) <= 5 * found.error + 1e-9
-        for place, name in enumerate(("t", *names)):
-            order = tuple(int(i == place) for i in range(len(values)))
-            moved = getattr(module, f"d_{name}")(*values)
-            assert abs(mp.mpf(float(moved)) - mp.diff(cdf, tuple(exact), order)) <= 5 * moved.error + 1e-9
+    check_chances(measure, names, cdf, values, method)
 
 
 @pytest.mark.parametrize(("measure", "mean"), [

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from polygons import area, in_square
 
 import potto
 from potto.integrate.adaptive.iterated import Iteration
@@ -53,26 +54,10 @@ def mesh(kind: str, count: int) -> Any:
     return np.array(rows)[random.permutation(len(rows))[:count]]
 
 
-def area(row: Any) -> float:
+def covered_area(row: Any) -> float:
     """Of the triangle clipped to the pixel, in fractions."""
     x0, y0, *rest = (Fraction(float(z)) for z in row)
-    polygon = [(rest[i], rest[i + 1]) for i in (0, 2, 4)]
-    w = Fraction(1, 16)
-    sides = [((1, 0), x0), ((-1, 0), -x0 - w), ((0, 1), y0), ((0, -1), -y0 - w)]
-    for (u, v), least in sides:
-        kept = []
-        for p, q in zip(polygon, polygon[1:] + polygon[:1], strict=True):
-            f, g = u * p[0] + v * p[1] - least, u * q[0] + v * q[1] - least
-            if f >= 0:
-                kept.append(p)
-            if f * g < 0:
-                s = f / (f - g)
-                kept.append((p[0] + s * (q[0] - p[0]), p[1] + s * (q[1] - p[1])))
-        polygon = kept
-        if not polygon:
-            return 0.0
-    closed = polygon[1:] + polygon[:1]
-    return float(sum(p[0] * q[1] - q[0] * p[1] for p, q in zip(polygon, closed, strict=True)) / 2)
+    return float(area(in_square([(rest[i], rest[i + 1]) for i in (0, 2, 4)], x0, y0, Fraction(1, 16))))
 
 
 def both(rows: Any) -> tuple[Any, list[Any]]:
@@ -85,7 +70,7 @@ def both(rows: Any) -> tuple[Any, list[Any]]:
 def test_a_mesh_as_an_array_is_what_its_pairs_are(kind: str) -> None:
     rows = mesh(kind, 40)
     together, single = both(rows)
-    exact = np.array([area(row) for row in rows])
+    exact = np.array([covered_area(row) for row in rows])
     assert (np.abs(together.value - exact) <= together.error + 1e-17).all()
     tangents, errors = np.array(together.tangent), np.array(together.tangent_error)
     assert np.isfinite(tangents).all() and (errors <= 1e-6).all()
@@ -111,7 +96,7 @@ def test_an_interior_derivative_of_a_warped_mesh_by_differences() -> None:
             up, down = row.copy(), row.copy()
             up[2 + d] += 1e-6
             down[2 + d] -= 1e-6
-            slope = (area(up) - area(down)) / (up[2 + d] - down[2 + d])
+            slope = (covered_area(up) - covered_area(down)) / (up[2 + d] - down[2 + d])
             assert abs(answer.tangent[d][i] - slope) <= 1e-6
 
 
@@ -228,7 +213,7 @@ def test_members_along_every_axis_are_looked_at_in_all_directions_together(monke
     monkeypatch.setattr(Iteration, "whole", lambda *args: calls.append(args[2]) or whole(*args))
     answer = potto.grad(MODULE.covered, WRT)(**columns)
     assert answer.converged and 0 < len(calls) <= 10
-    exact = np.array([area(row) for row in rows])
+    exact = np.array([covered_area(row) for row in rows])
     assert (np.abs(answer.value - exact) <= answer.error + 1e-17).all()
 
 

@@ -16,6 +16,7 @@ from typing import Any
 
 import mpmath as mp
 import pytest
+from references.tools import roots
 
 import potto
 
@@ -58,34 +59,11 @@ KINDS = {"polynomial": polynomial, "waves": waves, "damped": damped, "with a bra
 LO, HI = -1.0, 1.5
 
 
-def roots_of(f: Callable[[Any], Any]) -> list[Any]:
-    """Where f changes sign. Between two nodes it may do so twice: then it has a turn there with another sign."""
-    xs = [mp.mpf(LO) + (mp.mpf(HI) - LO) * k / NODES for k in range(NODES + 1)]
-    ys = [f(x) for x in xs]
-    found = []
-    for k in range(NODES):
-        if ys[k] * ys[k + 1] < 0:
-            found.append(bisected(f, xs[k], xs[k + 1]))
-        elif k > 0 and abs(ys[k]) < min(abs(ys[k - 1]), abs(ys[k + 1])) and ys[k] * ys[k - 1] > 0:
-            turn = lowest(lambda x, y=ys[k]: mp.sign(y) * f(x), xs[k - 1], xs[k + 1])
-            if f(turn) * ys[k] < 0:
-                found += [bisected(f, xs[k - 1], turn), bisected(f, turn, xs[k + 1])]
-    return found
-
-
 def bisected(f: Callable[[Any], Any], a: Any, b: Any) -> Any:
     sign = mp.sign(f(a))
     for _ in range(110):
         middle = (a + b) / 2
         a, b = (middle, b) if mp.sign(f(middle)) == sign else (a, middle)
-    return (a + b) / 2
-
-
-def lowest(f: Callable[[Any], Any], a: Any, b: Any) -> Any:
-    ratio = (mp.sqrt(5) - 1) / 2
-    for _ in range(140):
-        c, d = b - ratio * (b - a), a + ratio * (b - a)
-        a, b = (a, d) if f(c) < f(d) else (c, b)
     return (a + b) / 2
 
 
@@ -96,15 +74,15 @@ def truth(function: Function, t: float) -> tuple[Any, Any, Any]:
     def f(x: Any) -> Any:
         return function(x, mp.mpf(t))
 
-    roots = roots_of(f)
-    ends = [mp.mpf(LO), *roots, mp.mpf(HI)]
+    cuts = roots(f, LO, HI, NODES, bisected)
+    ends = [mp.mpf(LO), *cuts, mp.mpf(HI)]
     value = mp.mpf(0)
     for a, b in itertools.pairwise(ends):
         if f((a + b) / 2) < 0:
             value += mp.exp(b) - mp.exp(a)
     h = mp.mpf(10) ** -12
-    slopes = [(f(x + h) - f(x - h)) / (2 * h) for x in roots]
-    parts = [mp.exp(x) / abs(s) if abs(s) < 1e9 else mp.mpf(0) for x, s in zip(roots, slopes, strict=True)]
+    slopes = [(f(x + h) - f(x - h)) / (2 * h) for x in cuts]
+    parts = [mp.exp(x) / abs(s) if abs(s) < 1e9 else mp.mpf(0) for x, s in zip(cuts, slopes, strict=True)]
     return value, mp.fsum(parts), mp.fsum(abs(p) for p in parts)
 
 

@@ -12,7 +12,7 @@ from typing import Any
 import mpmath as mp
 import numpy as np
 from exact_dynamics import held, stepped, thrown, warmed
-from exact_fields import ARROW, SITES, WAVES, balls, bright, clipped, shoelace, two_bands
+from exact_fields import ARROW, SITES, WAVES, balls, bright, cell_area, two_bands
 from exact_probability import (
     VOLATILITY,
     accepted,
@@ -24,6 +24,7 @@ from exact_probability import (
 )
 from exact_worked import above_the_ray, mean_beyond, misfit, quarter_in_the_square
 from level_sets_reference import Given, integral
+from polygons import area
 
 Pair = tuple[float, float]
 
@@ -129,12 +130,12 @@ def _book(s: Any) -> Any:
 
 def _site(x: Any) -> Any:
     sites = [(mp.mpf(a), mp.mpf(b)) for a, b in SITES]
-    return clipped([*sites[:2], (x, sites[2][1]), *sites[3:]], 0)
+    return cell_area([*sites[:2], (x, sites[2][1]), *sites[3:]], 0)
 
 
 def _tip(x: Any) -> Any:
     corners = [(mp.mpf(a), mp.mpf(b)) for a, b in ARROW]
-    return shoelace([corners[0], (x, corners[1][1]), *corners[2:]])
+    return area([corners[0], (x, corners[1][1]), *corners[2:]])
 
 
 def _misses(t: Any) -> Any:

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 import mpmath as mp
+import polygons
 
 
 def two_bands(e: Any, v: Any, w: Any) -> Any:
@@ -49,7 +50,7 @@ def bright(t: Any) -> Any:
 WAVES = [(1.0, 2.3, 0.4), (-2.9, 1.1, 1.7), (2.1, -3.7, 4.2), (4.3, 3.1, 2.9)]
 
 
-def clipped(sites: list[tuple[Any, Any]], own: int) -> Any:
+def cell_area(sites: list[tuple[Any, Any]], own: int) -> Any:
     """The area of a cell: the square, cut with one half plane after another."""
     corners = [(mp.mpf(x), mp.mpf(y)) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1))]
     px, py = sites[own]
@@ -60,19 +61,8 @@ def clipped(sites: list[tuple[Any, Any]], own: int) -> Any:
         def side(c: tuple[Any, Any], qx: Any = qx, qy: Any = qy) -> Any:
             return (c[0] - qx) ** 2 + (c[1] - qy) ** 2 - (c[0] - px) ** 2 - (c[1] - py) ** 2
 
-        kept = []
-        for a, b in zip(corners, corners[1:] + corners[:1]):
-            if side(a) >= 0:
-                kept.append(a)
-            if (side(a) >= 0) != (side(b) >= 0):
-                share = side(a) / (side(a) - side(b))
-                kept.append((a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1])))
-        corners = kept
-    return shoelace(corners)
-
-
-def shoelace(corners: list[tuple[Any, Any]]) -> Any:
-    return sum(a[0] * b[1] - a[1] * b[0] for a, b in zip(corners, corners[1:] + corners[:1])) / 2
+        corners = polygons.clipped(corners, side)
+    return polygons.area(corners)
 
 
 SITES = [(0.2, 0.3), (0.7, 0.2), (0.5, 0.6), (0.15, 0.8), (0.85, 0.75)]

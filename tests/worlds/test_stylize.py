@@ -11,12 +11,12 @@ from typing import Any
 import mpmath as mp
 import numpy as np
 import pytest
+from polygons import Polygon, in_square
 
 import potto
 
 FOLDER = Path(__file__).parents[2] / "examples" / "stylize"
 BY_HAND = Path(__file__).parents[2] / "benchmarks" / "mesh_by_hand.py"
-Points = list[tuple[mp.mpf, mp.mpf]]
 
 
 def loaded(name: str, file: Path) -> Any:
@@ -38,21 +38,7 @@ def by_hand() -> Any:
     return loaded("mesh_by_hand", BY_HAND).loss_and_gradient
 
 
-def clipped(polygon: Points, x: mp.mpf, y: mp.mpf, h: mp.mpf) -> Points:
-    """What of a triangle is in a square (Sutherland and Hodgman 1974)."""
-    for axis, end, sign in ((0, x, 1), (0, x + h, -1), (1, y, 1), (1, y + h, -1)):
-        kept: Points = []
-        for p, q in zip(polygon, polygon[1:] + polygon[:1], strict=True):
-            u, v = sign * (p[axis] - end), sign * (q[axis] - end)
-            if u >= 0:
-                kept.append(p)
-            if u * v < 0:
-                kept.append((p[0] + u / (u - v) * (q[0] - p[0]), p[1] + u / (u - v) * (q[1] - p[1])))
-        polygon = kept
-    return polygon
-
-
-def integrated(polygon: Points, f: Any) -> mp.mpf:
+def integrated(polygon: Polygon, f: Any) -> mp.mpf:
     """Over a fan of triangles by three nodes of Gauss twice: exact up to the fourth degree."""
     if len(polygon) < 3:
         return mp.mpf(0)
@@ -70,7 +56,8 @@ def integrated(polygon: Points, f: Any) -> mp.mpf:
 def loss(corners: Any, faces: np.ndarray, colours: Any, photo: np.ndarray) -> mp.mpf:
     size, total = len(photo), mp.mpf(0)
     for (j, i), face in itertools.product(np.ndindex(size, size), range(len(faces))):
-        piece = clipped([tuple(corners[k]) for k in faces[face]], mp.mpf(i) / size, mp.mpf(j) / size, 1 / mp.mpf(size))
+        triangle, h = [tuple(corners[k]) for k in faces[face]], 1 / mp.mpf(size)
+        piece = in_square(triangle, i * h, j * h, h)
 
         def far(x: mp.mpf, y: mp.mpf, j: int = j, i: int = i, face: int = face) -> mp.mpf:
             terms = (1, x, y, x * x, x * y, y * y)[: len(colours[face])]

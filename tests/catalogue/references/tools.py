@@ -60,25 +60,30 @@ def second(value: Value, step: float = 1e-4) -> Value:
 # Roots in one variable
 
 
-def roots(f: Value, lo: Any, hi: Any, nodes: int = NODES) -> list[Any]:
-    """Where f changes sign. Between two nodes it may do so twice: then it has a turn there with another sign."""
+def between(f: Value, a: Any, b: Any) -> Any:
+    """The root between two signs."""
+    return mp.findroot(f, (a, b), solver="anderson", tol=mp.eps**1.8, maxsteps=200, verify=False)
+
+
+def roots(
+    f: Value, lo: Any, hi: Any, nodes: int = NODES, refined: Callable[[Value, Any, Any], Any] = between
+) -> list[Any]:
+    """Where f changes sign. Between two nodes it may do so twice: then it has a turn there with another sign.
+
+    refined: what finds the root between two signs.
+    """
     lo, hi = mp.mpf(lo), mp.mpf(hi)
     xs = [lo + (hi - lo) * k / nodes for k in range(nodes + 1)]
     ys = [f(x) for x in xs]
     found = []
     for k in range(nodes):
         if ys[k] * ys[k + 1] < 0:
-            found.append(between(f, xs[k], xs[k + 1]))
+            found.append(refined(f, xs[k], xs[k + 1]))
         elif k > 0 and abs(ys[k]) < min(abs(ys[k - 1]), abs(ys[k + 1])) and ys[k] * ys[k - 1] > 0:
             turn = lowest(lambda x, y=ys[k]: mp.sign(y) * f(x), xs[k - 1], xs[k + 1])
             if f(turn) * ys[k] < 0:
-                found += [between(f, xs[k - 1], turn), between(f, turn, xs[k + 1])]
+                found += [refined(f, xs[k - 1], turn), refined(f, turn, xs[k + 1])]
     return found
-
-
-def between(f: Value, a: Any, b: Any) -> Any:
-    """The root between two signs."""
-    return mp.findroot(f, (a, b), solver="anderson", tol=mp.eps**1.8, maxsteps=200, verify=False)
 
 
 def lowest(f: Value, a: Any, b: Any) -> Any:
