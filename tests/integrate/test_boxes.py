@@ -9,7 +9,11 @@ import numpy as np
 import pytest
 
 import potto
+from potto.integrate.fixed.lowered_boxes import LoweredBoxes, Passed
+from potto.kernels.native import objects
 from potto.runtime.integration import quadrature
+
+needs_llvm = pytest.mark.skipif(not objects.available(), reason="llvmlite is not installed")
 
 PROGRAM = """
 def line(a, b, t) integral ([a, a + 1/16], [b, b + 1/16]) exp(x*y)*[x + 2*y >= t] d(x, y)
@@ -24,9 +28,12 @@ def moving(a, b, t) integral ([a, a + t/16], [b, b + 1/16]) x*y d(x, y)
 def turned(a, b, t) integral ([a + 1/16, a], [b, b + 1/16]) exp(x*y)*[x + 2*y >= t] d(x, y)
 def pair(a, b, t) integral ([a, a + 1/16], [b, b + 1/16]) (x*[x > t], y*t) d(x, y)
 def weighed(p, q, h, w, t) integral ([p, p + h], [q, q + h]) exp(w*x*y)*[x + 2*y >= t] d(x, y)
+def toned(a, b, t) weighed(a, b, 1/16, t/3, t - 0.1)
 def about(a, b, t) weighed(a - 0.1/3, b - 0.1/3, 0.2/3, 1/3, t)
 """
-NAMES = ["line", "saddle", "disc", "root", "peak", "wave", "solid", "strip", "moving", "turned", "pair", "about"]
+NAMES = [
+    "line", "saddle", "disc", "root", "peak", "wave", "solid", "strip", "moving", "turned", "pair", "toned", "about",
+]  # fmt: skip
 
 
 def picture(name: str, t: float) -> potto.Estimate:
@@ -56,9 +63,9 @@ def test_a_picture_is_the_same_without_looking_for_whole_pixels(
     assert (with_boxes.member_converged | ~without.member_converged).all()
 
 
+@needs_llvm
 @pytest.mark.parametrize("name", NAMES)
 def test_machine_code_gives_whole_pixels_as_numpy_does(name: str) -> None:
-    pytest.importorskip("llvmlite")
     found = []
     for backend in ("numpy", "native"):
         with potto.settings(backend=backend):
@@ -70,6 +77,24 @@ def test_machine_code_gives_whole_pixels_as_numpy_does(name: str) -> None:
         assert (np.abs(v - w) <= 8 * np.spacing(np.abs(w)) + 0.01 * np.minimum(e, f)).all()
         assert (e <= 3 * f + 1e-15 * most).all() and (f <= 3 * e + 1e-15 * most).all()
     assert (found[0].member_converged == found[1].member_converged).all()
+
+
+@needs_llvm
+def test_machine_code_takes_parameters_that_rounding_puts_off(monkeypatch: pytest.MonkeyPatch) -> None:
+    done: list[int] = []
+    run = LoweredBoxes.run
+
+    def noted(way: LoweredBoxes, *given: Any) -> Passed:
+        passed = run(way, *given)
+        done.append(int(passed.done.sum()))
+        return passed
+
+    monkeypatch.setattr(LoweredBoxes, "run", noted)
+    with potto.settings(backend="native"):
+        picture("toned", 0.7)
+    a, b = np.meshgrid(np.arange(16) / 16, np.arange(16) / 16)
+    near = np.abs(a + 2 * b + 3 / 32 - 0.6) < 3 / 32  # pixels that the line x + 2 y = t - 0.1 cuts
+    assert sum(done) == 256 - near.sum()
 
 
 def test_whole_pixels_have_the_values_of_a_closed_form() -> None:
@@ -88,13 +113,14 @@ def f(a, b, t) integral ([a, a + 1/512], [b, b + 1/512]) 1/(x + y + t)^2*[x + y 
     assert got.evals == 16 * 64 * 64  # a product of 4 x 4 nodes each, and no cuts
 
 
+@pytest.mark.parametrize("backend", ["numpy", pytest.param("native", marks=needs_llvm)])
 @pytest.mark.parametrize("place", ["weighed(a - length(t), b, 1/16, 1, t)", "weighed(a, b, 1/16, length(t), t)"])
-def test_whole_pixels_are_off_by_what_their_bounds_and_parameters_are(place: str) -> None:
+def test_whole_pixels_are_off_by_what_their_bounds_and_parameters_are(place: str, backend: str) -> None:
     length = "def length(t) integral ([0, 1], [0, 1]) sqrt(abs(x - y*t))/10 d(x, y)"
     m = potto.compile(f"{PROGRAM}{length}\ndef f(a, b, t) {place}\n")
     a, b = np.meshgrid(np.arange(16) / 16, np.arange(16) / 16)
     exact = m.f(a, b, 0.7)
-    with potto.settings(rtol=1e-3):
+    with potto.settings(rtol=1e-3, backend=backend):
         found, length = m.f(a, b, 0.7), m.length(0.7)
     whole = np.abs(a + 2 * b - 0.7) > 0.3  # clear of the line
     off = np.abs(found.value - exact.value)[whole]

@@ -14,7 +14,7 @@ from functools import reduce
 from msgspec import Struct
 
 from potto.core.terms import Lam, Term, Tuple, children, function_of
-from potto.integrate.fixed.formula_text import ParameterPlace, Symbol, still
+from potto.integrate.fixed.formula_text import ParameterPlace, Symbol
 from potto.integrate.fixed.rule_text import RuleText
 from potto.integrate.fixed.straight import StraightIntegral
 from potto.integrate.pieces import Evaluator
@@ -73,7 +73,7 @@ class BoxText(RuleText):
         at, each = self.at, self.channels
         self.begin()
         self.added = [at.room(n * each) for n in self.orders]
-        self.most = [at.room(1) for _ in range(each)]
+        self.most, self.own = ([at.room(1) for _ in range(each)] for _ in range(2))
         here, columns = self.parameters(places, self.columns, int(self.look.known))
         ends = self.evaluated(self.look.bounds, here, self.machine)
         if any(end.e is not None or any(x is not None for x in end.t) for end in ends):
@@ -88,7 +88,7 @@ class BoxText(RuleText):
             self.face = function_of(face)
             for added, n in zip(self.added, self.orders, strict=True):
                 self.fill(added, str(n), each)
-            for room in self.most:
+            for room in (*self.most, *self.own):
                 at.store(self.zero, room)
             self.results([x or self.zero for x in self.mean(0, here, self.one)], mask)
             at.end()
@@ -105,7 +105,7 @@ class BoxText(RuleText):
     def sides(self, env: Mapping[str, Symbol]) -> list[str]:
         """For each face of which members it is the integrand; what became of the others is noted."""
         at, look = self.at, self.look
-        here = {name: still(symbol) for name, symbol in env.items()}
+        here = {name: Symbol(symbol.v, symbol.e, (), ()) for name, symbol in env.items()}
         clear = [at.apply("and", at.apply("lt", size, at.number(float("inf"))), at.apply("gt", size, self.zero))
                  for size in self.sizes]  # fmt: skip
         known, sides = [], []
@@ -149,9 +149,15 @@ class BoxText(RuleText):
 
     def enclosed(self, here: Mapping[str, Symbol]) -> list[Names]:
         """Bounds of the other surfaces."""
-        box = {name: Names(symbol.v, symbol.v) for name, symbol in here.items()}
+        box = {name: self.range(symbol) for name, symbol in here.items()}
         box |= dict(zip(self.plan.variables, map(Names, self.low, self.high), strict=True))
         return WrittenInterval(self.at).walk(self.look.curved, box, {}) if self.look.curved else []
+
+    def range(self, symbol: Symbol) -> Names:
+        """What a parameter can be."""
+        if symbol.e is None:
+            return Names(symbol.v, symbol.v)
+        return Names(self.at.apply("sub", symbol.v, symbol.e), self.at.apply("add", symbol.v, symbol.e))
 
     def among(self, decided: str, sides: Sequence[tuple[str, str]], codes: Sequence[int]) -> str:
         """Whose sides are one of these."""
@@ -192,15 +198,18 @@ class BoxText(RuleText):
         return [at.load(at.at(sums, c)) if c in moving else None for c in range(each)]
 
     def values(self, env: dict[str, Symbol], weight: str) -> list[str | None]:
-        """The integrand's numbers at a node, each with its tangents; their sizes are added up."""
+        """The integrand's numbers at a node, each with its tangents. Their sizes are added up, and how far off they are
+        where parameters are."""
         at = self.at
         cells = self.evaluated(self.face, env, self.machine)
         found = [self.plain(x) for cell in cells for x in (cell.v, *(cell.t or (None,) * (self.k1 - 1)))]
         if len(found) != self.channels:
             raise NotStraight("a tuple of another size")
-        for value, room in zip(found, self.most, strict=True):
-            if value is not None:
-                at.store(at.apply("add", at.load(room), at.apply("mul", weight, at.apply("abs", value))), room)
+        errors = [x for cell in cells for x in (cell.e, *(cell.et or (None,) * (self.k1 - 1)))]
+        sizes = [None if value is None else at.apply("abs", value) for value in found]
+        for size, room in zip((*sizes, *errors), (*self.most, *self.own), strict=True):
+            if size is not None:
+                at.store(at.apply("add", at.load(room), at.apply("mul", weight, size)), room)
         return found
 
     # What they amount to
@@ -220,6 +229,7 @@ class BoxText(RuleText):
         bounds, good = [], None
         for c, mean in enumerate(means):
             error, floor = self.zero, at.apply("mul", at.number(4 * EPS), at.load(self.most[c]))
+            floor = at.apply("add", floor, at.load(self.own[c]))
             for i, n in enumerate(self.orders):
                 sizes = [at.load(at.at(self.added[i], row * self.channels + c)) for row in range(n)]
                 slope = self.total(*(at.apply("mul", at.number(float(s)), x)

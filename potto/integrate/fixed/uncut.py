@@ -30,7 +30,7 @@ MOST_SIDES, MOST_FACES = 4, 4
 
 def uncut(box: Box, machine: Evaluator, env: dict[str, Value], batch: int) -> tuple[Sums, Ints] | None:
     """The sums of a batch, and the members that were not integrated here, whose sums are 0; None if none were."""
-    able = machine.backend != "numpy" and all(map(_exact, map(env.get, box.names)))
+    able = machine.backend != "numpy" and all(isinstance(env.get(name), Cell) for name in box.names)
     ways = _deciding(box, machine, env) if able else ()
     passed = _passed(ways, machine, env, batch, ())
     if passed is not None:
@@ -86,11 +86,6 @@ def _of_face(
 
 
 # By machine code
-
-
-def _exact(value: Value | None) -> bool:
-    """Whether a value is a number without an error."""
-    return isinstance(value, Cell) and value.e is None and not any(x is not None for x in value.et)
 
 
 def _deciding(box: Box, machine: Evaluator, env: dict[str, Value]) -> tuple[LoweredBoxes, ...]:
