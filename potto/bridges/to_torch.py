@@ -119,8 +119,6 @@ def _functions(torch: Any) -> Callable[..., Any]:
     class Rows(torch.autograd.Function):  # type: ignore[misc]
         """What the three have in common: the question to Potto, its arguments kept, and batches."""
 
-        question = ""
-
         @staticmethod
         def setup_context(ctx: Any, inputs: Any, output: Any) -> None:
             moving, still, ctx.flat, ctx.sizes = inputs

@@ -68,7 +68,7 @@ from potto.core.walking import children as children
 from potto.core.walking import fresh as fresh
 from potto.core.walking import outside as outside
 from potto.core.walking import postorder as postorder
-from potto.core.walking import postorder_by as postorder_by
+from potto.core.walking import reached as reached
 from potto.core.walking import rebuild as rebuild
 from potto.core.walking import rename_bound as rename_bound
 from potto.core.walking import replaced as replaced

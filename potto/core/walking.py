@@ -237,6 +237,20 @@ def outside(root: Term, binders: tuple[type[Term], ...]) -> Iterator[Term]:
                 waiting.extend(children(node))
 
 
+def reached(*roots: Term, resolve: Callable[[Global], Term | None]) -> Iterator[list[Term]]:
+    """The parts of terms, and those of the definitions that they lead to, as `postorder` has them, each once.
+
+    resolve: what a name stands for; None where nobody knows.
+    """
+    waiting, seen = list(roots), set[Term]()
+    while waiting:
+        parts = postorder(waiting.pop())
+        yield parts
+        names = [node for node in parts if isinstance(node, Global) and node not in seen]
+        seen.update(names)
+        waiting += [known for name in names if (known := resolve(name)) is not None]
+
+
 _BOUND: dict[type, Callable[[Any], tuple[str, ...]]] = {
     Lam: lambda t: t.params,
     Integral: lambda t: t.variables,
@@ -266,11 +280,6 @@ def fresh(name: str, taken: Iterable[str]) -> str:
 def stem(name: str) -> str:
     """What a fresh name was made from: the name that a person wrote."""
     return name.split("'")[0]
-
-
-def postorder_by(root: Term, below: Callable[[Term], Sequence[Term]]) -> list[Term]:
-    """Every distinct term that `below` leads to from the root once, after what is below it. Does not recurse."""
-    return postorder(root, below=below)
 
 
 def substitute(term: Term, mapping: Mapping[str, Term]) -> Term:

@@ -209,13 +209,13 @@ def _turned(node: Prim, op: str) -> tuple[Terms, ...]:
     return tuple((a, inner[0].args[0]) for a in node.args if a is not inner[0] and a.free)
 
 
-def _cartesian_images(x: Terms, u: Terms) -> Mapping[Term, Term]:
-    (radius, angle) = x
-    images: dict[Term, Term] = {}
-    for op, image in (("cos", u[0]), ("sin", u[1])):
-        trig = prim(op, angle)
-        images[mul(radius, trig)] = image
-        images[mul(trig, radius)] = image
+def _multiples(first: str, second: str) -> Callable[[Terms, Terms], Mapping[Term, Term]]:
+    """What r f(w) and r g(w) become, for two builtins f and g."""
+
+    def images(x: Terms, u: Terms) -> Mapping[Term, Term]:
+        parts = [(prim(op, x[1]), image) for op, image in zip((first, second), u, strict=True)]
+        return {product: image for part, image in parts for product in (mul(x[0], part), mul(part, x[0]))}
+
     return images
 
 
@@ -227,19 +227,9 @@ cartesian = _register(
         forward=lambda x, p: (mul(x[0], prim("cos", x[1])), mul(x[0], prim("sin", x[1]))),
         inverse=lambda u, p: (prim("hypot", u[0], u[1]), prim("atan2", u[1], u[0])),
         domain=((0.1, 3.0), (-3.0, 3.0)),
-        recognition=Recognition(anchor=lambda node: _turned(node, "cos"), images=_cartesian_images),
+        recognition=Recognition(anchor=lambda node: _turned(node, "cos"), images=_multiples("cos", "sin")),
     )
 )
-
-
-def _boost_images(x: Terms, u: Terms) -> Mapping[Term, Term]:
-    (size, rapidity) = x
-    images: dict[Term, Term] = {}
-    for op, image in (("cosh", u[0]), ("sinh", u[1])):
-        part = prim(op, rapidity)
-        images[mul(size, part)] = image
-        images[mul(part, size)] = image
-    return images
 
 
 rapidity = _register(
@@ -253,6 +243,6 @@ rapidity = _register(
             mul(_HALF, prim("log", div(add(u[0], u[1]), sub(u[0], u[1])))),
         ),
         domain=((0.1, 3.0), (-2.0, 2.0)),
-        recognition=Recognition(anchor=lambda node: _turned(node, "cosh"), images=_boost_images),
+        recognition=Recognition(anchor=lambda node: _turned(node, "cosh"), images=_multiples("cosh", "sinh")),
     )
 )

@@ -36,7 +36,6 @@ from potto.core.terms import (
     Tuple,
     Var,
     postorder,
-    postorder_by,
 )  # fmt: skip
 from potto.kernels.cells import Cell, Pattern, Trace, Value
 from potto.kernels.emit import ZERO, Lines, Scalar
@@ -91,7 +90,7 @@ class Writer:
             self.env[param] = self.unpack(argument, pattern)
 
     def written(self) -> Written:
-        for node in postorder_by(self.lam.body, _at_once):
+        for node in postorder(self.lam.body, below=_at_once):
             self.values[node] = self.emit(node)
         result = self.pack(self.values[self.lam.body])
         body = [*self.out.lines, f"return {result}"]

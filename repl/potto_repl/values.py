@@ -12,7 +12,7 @@ from typing import Any
 
 from msgspec import Struct
 
-from potto.core.terms import App, Delta, Global, Integral, Term, postorder
+from potto.core.terms import App, Delta, Global, Integral, Term, postorder, reached
 from potto.diagnostics import PottoError
 from potto.elaborate import elaborate_expression
 from potto.evaluating.world import World
@@ -90,18 +90,11 @@ def _called(world: World, term: Term) -> Term | None:
         term = world.program.linker.term(term.module, term.name)
     if not isinstance(term, App):
         return None
-    seen: set[Term] = set()
-    todo: list[Term] = [term]
-    while todo:
-        nodes = postorder(todo.pop())
-        integrals = [node for node in nodes if isinstance(node, Integral)]
+    for parts in reached(term, resolve=world.program.linker.reach.resolve):
+        integrals = [node for node in parts if isinstance(node, Integral)]
         known = {inner for node in integrals for inner in postorder(node.body) if inner.free & set(node.variables)}
-        for node in nodes:
-            if isinstance(node, Delta) and node not in known:
-                return None
-            if isinstance(node, Global) and node not in seen:
-                seen.add(node)
-                todo.append(world.program.linker.term(node.module, node.name))
+        if any(isinstance(node, Delta) and node not in known for node in parts):
+            return None
     return term
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from potto.core.terms import Branch, Const, If, Prim, Proj, Term, Tuple, Var, children, postorder, postorder_by
+from potto.core.terms import Branch, Const, If, Prim, Proj, Term, Tuple, Var, children, postorder
 
 _ARITHMETIC = frozenset(("add", "neg", "mul", "div"))
 MOST = 40  # more nodes than these ask for are no saving
@@ -19,7 +19,7 @@ def degree(term: Term, variables: Iterable[str]) -> int | None:
     polynomial."""
     found: dict[Term, int | None] = {}
     names = frozenset(variables)
-    for node in postorder_by(term, value_parts):
+    for node in postorder(term, below=value_parts):
         found[node] = 0 if names.isdisjoint(node.free) else _node(node, [found[part] for part in value_parts(node)])
     return found[term]
 

@@ -187,30 +187,26 @@ def _check_single(factor: Term, what: Delta, root: SurfaceRoot) -> None:
 
 
 def _jump(what: Delta) -> PottoError:
-    return PottoError(
-        (
-            PRODUCT_OF_DELTAS(
-                Span(0, 0),
-                f"`delta({format_term(what.coordinates[0])})` stands right where its factor jumps",
-                label="a jump and a delta on one surface",
-                help="a delta takes the value of its factor on its surface, and there it has two",
-            ),
-        )
+    return _product_of_deltas(
+        what,
+        "stands right where its factor jumps",
+        label="a jump and a delta on one surface",
+        help="a delta takes the value of its factor on its surface, and there it has two",
     )
 
 
 def _product(what: Delta) -> PottoError:
-    shown = format_term(what.coordinates[0])
-    return PottoError(
-        (
-            PRODUCT_OF_DELTAS(
-                Span(0, 0),
-                f"`delta({shown})` is multiplied by a delta on the same surface, which has no meaning",
-                label="a product of deltas",
-                help="differentiate the integral as a whole, or let the two surfaces cross",
-            ),
-        )
+    return _product_of_deltas(
+        what,
+        "is multiplied by a delta on the same surface, which has no meaning",
+        label="a product of deltas",
+        help="differentiate the integral as a whole, or let the two surfaces cross",
     )
+
+
+def _product_of_deltas(what: Delta, wrong: str, label: str, help: str) -> PottoError:
+    message = f"`delta({format_term(what.coordinates[0])})` {wrong}"
+    return PottoError((PRODUCT_OF_DELTAS(Span(0, 0), message, label=label, help=help),))
 
 
 def _magnitude(slope: Term) -> Term:

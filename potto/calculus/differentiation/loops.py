@@ -32,7 +32,6 @@ from potto.core.terms import (
     index,
     list_of,
     postorder,
-    postorder_by,
     proj,
     substitute,
     transform,
@@ -163,7 +162,7 @@ def element_of(whole: Term, place: Term) -> Term:
 
 def outside_binders(root: Term) -> list[Term]:
     """Every subterm under no binder, children first; of a loop its bounds and what it begins with."""
-    return postorder_by(root, lambda node: () if isinstance(node, Integral | Lam) else parts_below(node))
+    return postorder(root, below=lambda node: () if isinstance(node, Integral | Lam) else parts_below(node))
 
 
 def parts_below(node: Term) -> tuple[Term, ...]:

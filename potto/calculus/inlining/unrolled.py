@@ -27,7 +27,6 @@ from potto.core.terms import (
     children,
     const,
     postorder,
-    postorder_by,
     proj,
     rebuild,
     substitute,
@@ -71,7 +70,7 @@ class _Unrolling:
             for part in postorder(node.coordinates[0])
             if isinstance(part, Sum | Fold)
         }
-        for node in postorder_by(term, lambda node: self.below(node, taken)):
+        for node in postorder(term, below=lambda node: self.below(node, taken)):
             if node in taken:
                 memo[node] = memo[taken[node]]
             elif isinstance(node, Deriv):

@@ -30,7 +30,7 @@ from potto.core.terms import (
     Term,
     Tuple,
     Var,
-    postorder_by,
+    postorder,
 )
 
 _WRITTEN_OUT = Sum | Fold | Array | Index | Length | ListOf | Tuple | Data
@@ -47,7 +47,7 @@ def enclosable(term: Term, jumps: bool = False) -> bool:
         or (isinstance(node, Proj) and isinstance(node.term, Proj | Var | Index | Fold))
         or (isinstance(node, Prim) and (node.op in ARITHMETIC or RANGES.knows(node.op)))
         or (jumps and isinstance(node, Branch))
-        for node in postorder_by(term, _parts)
+        for node in postorder(term, below=_parts)
     )
 
 

@@ -25,7 +25,6 @@ from potto.core.terms import (
     mul,
     neg,
     postorder,
-    postorder_by,
     replaced,
     transform,
     with_integrand,
@@ -149,7 +148,7 @@ def _outermost(surface: Term) -> list[Prim]:
     def chooses(node: Term) -> bool:
         return isinstance(node, Prim) and PRIMITIVES[node.op].cases is not None and bool(node.free)
 
-    order = postorder_by(surface, lambda node: () if bound_names(node) or chooses(node) else children(node))
+    order = postorder(surface, below=lambda node: () if bound_names(node) or chooses(node) else children(node))
     return [node for node in order if isinstance(node, Prim) and chooses(node)]
 
 
@@ -203,4 +202,4 @@ def _apart(node: Term, most: int) -> Term:
 
 def _outside(surface: Term) -> list[Term]:
     """The parts of a surface that are not inside an integral or a sum of it, whose variables mean nothing outside."""
-    return postorder_by(surface, lambda node: () if bound_names(node) else children(node))
+    return postorder(surface, below=lambda node: () if bound_names(node) else children(node))

@@ -42,7 +42,7 @@ from potto.core.terms import (
     children,
     const,
     outside,
-    postorder_by,
+    postorder,
     proj,
     rebuild,
     with_integrand,
@@ -91,7 +91,7 @@ def _of_integral(
     forms = Forms(names, number)
     region, ordered = region_of(term, forms, outer)
     memo: dict[Term, Term] = {}
-    for node in postorder_by(term.body, lambda node: () if isinstance(node, Integral) else children(node)):
+    for node in postorder(term.body, below=lambda node: () if isinstance(node, Integral) else children(node)):
         if isinstance(node, Integral):
             memo[node] = _of_integral(node, region, names, number, few, premises)
         else:
@@ -143,12 +143,12 @@ class _Trees:
 
     def apart(self, body: Term) -> Term:
         """The body with each part that has nested conditions written as decisions."""
-        roots = [node for node in postorder_by(body, self.until_it_nests) if self.nests(node)]
+        roots = [node for node in postorder(body, below=self.until_it_nests) if self.nests(node)]
         met = [self.inner.intersection(outside(root, BINDERS)) for root in roots]
         if sum(map(len, met)) > len(set().union(*met)) or any(isinstance(root, Delta) for root in roots):
             return self.write(self.tree(body))  # they are decided together
         memo: dict[Term, Term] = {root: self.write(self.tree(root)) for root in roots}
-        order = postorder_by(body, lambda node: () if node in memo or isinstance(node, BINDERS) else children(node))
+        order = postorder(body, below=lambda node: () if node in memo or isinstance(node, BINDERS) else children(node))
         for node in order:
             if isinstance(node, BINDERS):
                 memo[node] = node
@@ -163,7 +163,7 @@ class _Trees:
         return () if isinstance(node, BINDERS) or self.nests(node) else children(node)
 
     def tree(self, root: Term) -> Tree:
-        for node in postorder_by(root, self.below):
+        for node in postorder(root, below=self.below):
             if node not in self.memo:
                 self.cases = self.looked = 0
                 self.memo[node] = self.of(node)

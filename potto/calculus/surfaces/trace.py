@@ -29,7 +29,7 @@ from potto.core.terms import (
     function_of,
     lam,
     outside,
-    postorder_by,
+    postorder,
 )  # fmt: skip
 from potto.core.walking import Holding
 
@@ -143,7 +143,7 @@ def _integrates(term: Term) -> bool:
 
 @lru_cache(maxsize=16384)
 def layout(term: Term) -> TermSites:
-    order = postorder_by(term, immediate)
+    order = postorder(term, below=immediate)
     sites: list[Site] = []
     index: dict[tuple[Term, int], int] = {}
 

@@ -17,7 +17,7 @@ from msgspec import Struct
 
 from potto.calculus.solving.enclosable import enclosable
 from potto.core.terms import ZERO as NOTHING
-from potto.core.terms import Branch, If, Integral, Prim, Term, Tuple, postorder_by
+from potto.core.terms import Branch, If, Integral, Prim, Term, Tuple, postorder
 from potto.integrate.rules.intervals import Interval
 from potto.integrate.rules.lowered_intervals import enclosures
 from potto.kernels.cells import Array, Bools, Ints
@@ -137,7 +137,7 @@ def _below(node: Term) -> tuple[Term, ...]:
 
 @lru_cache(maxsize=1024)
 def _structure(body: Term) -> tuple[Term, ...]:
-    return tuple(postorder_by(body, _below))
+    return tuple(postorder(body, below=_below))
 
 
 @lru_cache(maxsize=1024)

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 from msgspec import Struct
 
-from potto.core.terms import Branch, Const, Integral, Prim, Proj, Term, Tuple, Var, children
+from potto.core.terms import Branch, Const, Integral, Prim, Proj, Term, Tuple, Var, children, postorder
 from potto.integrate.pieces import Sums
 from potto.kernels.cells import Array, Bools, Ints
 
@@ -128,19 +128,15 @@ def _everywhere(holds: Bools) -> Bools:
 @lru_cache(maxsize=4096)
 def adds_nothing(body: Term) -> bool:
     """Whether no summand can be lost beside a larger one: products and builtins alone, under whatever conditions."""
-    todo, seen = [body], set()
-    while todo:
-        term = todo.pop()
-        if term in seen:
-            continue
-        seen.add(term)
-        if isinstance(term, Branch):
-            todo += (term.then, term.orelse)
-        elif isinstance(term, Const | Var | Tuple | Proj) or (isinstance(term, Prim) and term.op not in ("add", "sub")):
-            todo += children(term)
-        else:
-            return False
-    return True
+    return all(
+        isinstance(node, Branch | Const | Var | Tuple | Proj)
+        or (isinstance(node, Prim) and node.op not in ("add", "sub"))
+        for node in postorder(body, below=_values_of)
+    )
+
+
+def _values_of(term: Term) -> tuple[Term, ...]:
+    return (term.then, term.orelse) if isinstance(term, Branch) else children(term)
 
 
 def allowance(term: Integral, sums: Sums, rtol: float) -> Any:

@@ -10,7 +10,7 @@ from typing import Any
 
 from potto.calculus.inlining.numbers import with_numbers
 from potto.calculus.surfaces.branch_cuts import opened
-from potto.core.terms import Data, Deriv, Global, Integral, Lam, Term, postorder
+from potto.core.terms import Data, Deriv, Global, Integral, Lam, Term, postorder, reached
 from potto.diagnostics import PottoError
 from potto.integrate.outline import Outlines
 from potto.kernels.cells import Pattern, Value
@@ -96,16 +96,9 @@ class Linker:
         """The definitions that terms lead to, with the digests of what they are: what a plan depends on."""
         found = self.reaches.get(terms)
         if found is None:
-            seen: dict[Global, bytes] = {}
-            todo: list[Term] = list(terms)
-            while todo:
-                for node in postorder(todo.pop()):
-                    if isinstance(node, Global) and node not in seen:
-                        term = self.term(node.module, node.name)
-                        seen[node] = term.digest
-                        todo.append(term)
-            found = tuple(sorted((g.module, g.name, digest) for g, digest in seen.items()))
-            self.reaches[terms] = found
+            every = {node for parts in reached(*terms, resolve=self.reach.resolve) for node in parts}
+            names = [(node.module, node.name) for node in every if isinstance(node, Global)]
+            found = self.reaches[terms] = tuple(sorted((*name, self.term(*name).digest) for name in names))
         return found
 
     def function(self, head: Term) -> Lam | Deriv | None:

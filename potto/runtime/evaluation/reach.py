@@ -7,11 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from functools import wraps
+from itertools import chain
 from typing import Any, ParamSpec, TypeVar
 
 from potto.calculus.inlining.arrays import ARRAYS
 from potto.calculus.inlining.expand import Resolve
-from potto.core.terms import Branch, Delta, Deriv, Global, Index, Integral, Lam, Prim, Term, outside, postorder
+from potto.core.terms import Branch, Delta, Deriv, Global, Index, Integral, Lam, Prim, Term, outside, reached
 from potto.primitives import PRIMITIVES
 
 MOST_KEPT = 4096  # results of one function
@@ -75,15 +76,7 @@ class Reach:
         return isinstance(node, Delta)
 
     def _all(self, term: Term) -> Iterator[Term]:
-        seen: set[Term] = set()
-        todo = [term]
-        while todo:
-            for node in postorder(todo.pop()):
-                yield node
-                if isinstance(node, Global) and node not in seen:
-                    seen.add(node)
-                    known = self.resolve(node)
-                    todo += [] if known is None else [known]
+        return chain.from_iterable(reached(term, resolve=self.resolve))
 
     def _found(self, term: Term) -> Iterator[type]:
         for node in self._all(term):

@@ -29,7 +29,6 @@ from potto.core.terms import (
     fresh,
     function_of,
     postorder,
-    postorder_by,
     proj,
     substitute,
     transform,
@@ -177,7 +176,7 @@ def _surely(term: Term) -> list[Term]:
     def below(node: Term) -> tuple[Term, ...]:
         return children(node)[:-2] if isinstance(node, If | Branch) else () if bound_names(node) else children(node)
 
-    return postorder_by(term, below)
+    return postorder(term, below=below)
 
 
 def _by_names(term: Term, names: dict[Term, Term]) -> Term:

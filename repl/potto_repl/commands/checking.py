@@ -14,7 +14,7 @@ from typing import Any
 from msgspec import Struct
 from msgspec.structs import replace
 
-from potto.core.terms import Delta, Global, Term, postorder
+from potto.core.terms import Delta, Term, reached
 from potto.diagnostics import PottoError
 from potto.elaborate import elaborate_expression
 from potto.projects.settings import Settings
@@ -136,23 +136,12 @@ def _reference(session: Conversation, called: Called, name: str, scale: float) -
 
 def _depth(session: Conversation, term: Term) -> int:
     """The variables of integration inside each other, followed through definitions."""
-    return sum(map(dimensions, _reached(session, term)))
-
-
-def _reached(session: Conversation, term: Term) -> list[Term]:
-    """The term and those of all definitions that it leads to."""
-    found: dict[Term, Term] = {term: term}
-    todo = [term]
-    while todo:
-        for node in postorder(todo.pop()):
-            if isinstance(node, Global) and node not in found:
-                found[node] = session.world.lookup(node.module, node.name)
-                todo.append(found[node])
-    return list(found.values())
+    return sum(dimensions(parts[-1]) for parts in reached(term, resolve=session.world.program.linker.reach.resolve))
 
 
 def _has_deltas(session: Conversation, term: Term) -> bool:
-    return any(isinstance(node, Delta) for each in _reached(session, term) for node in postorder(each))
+    every = reached(term, resolve=session.world.program.linker.reach.resolve)
+    return any(isinstance(node, Delta) for parts in every for node in parts)
 
 
 def _extrapolated(session: Conversation, called: Called, slope: Slope, scale: float) -> Difference:
