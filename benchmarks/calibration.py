@@ -3,7 +3,7 @@
 truncation, singular, analytic: how often the estimates of `potto.integrate.rules.gauss` are exceeded, by how much,
 and how much larger than the error they are; singular is `truncation` as it is for pieces at whose ends powers may be.
 edge: how near a piece may come to the edge of a builtin's domain before the coefficients no longer tell (`EDGE` in
-`potto.integrate.fixed.alike`). Functions are drawn from families that are told in their names; the truth is a rule of
+`potto.integrate.fixed.edges`). Functions are drawn from families that are told in their names; the truth is a rule of
 20 nodes on 800 graded panels.
 """
 

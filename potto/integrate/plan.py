@@ -46,7 +46,7 @@ from potto.core.terms import (
     var,
     with_integrand,
 )  # fmt: skip
-from potto.integrate.fixed.boxes import Box, box_of
+from potto.integrate.fixed.boxes.sides import Box, box_of
 from potto.integrate.fixed.straight import StraightIntegral, straight
 from potto.integrate.levels import Group, LevelPlan
 from potto.integrate.outline import Outline, Outlines, outlined

@@ -8,7 +8,7 @@ import mpmath as mp
 import pytest
 
 import potto
-from potto.integrate.fixed import alone
+from potto.integrate.fixed.proved_sums import alone
 from potto.kernels.making import counts
 
 pytest.importorskip("llvmlite")

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 import potto
-from potto.integrate.fixed import topologies as module
+from potto.integrate.fixed.cells import topologies as module
+from potto.integrate.fixed.cells.topologies import in_order
 from potto.integrate.fixed.lowered_topologies import Found, LoweredTopologies
-from potto.integrate.fixed.topologies import in_order
 from potto.kernels.cells import Cell
 
 pytest.importorskip("llvmlite")

@@ -16,9 +16,9 @@ import pytest
 from how_many import examples
 
 import potto
-from potto.integrate.fixed import sum_text
-from potto.integrate.fixed.settled import SettledRegion
-from potto.integrate.fixed.sum_text import RepeatedSum, SumText
+from potto.integrate.fixed.proved_sums import sum_text
+from potto.integrate.fixed.proved_sums.settled import SettledRegion
+from potto.integrate.fixed.proved_sums.sum_text import RepeatedSum, SumText
 from potto.kernels.cells import Cell
 from potto.kernels.native.operations import NotStraight
 

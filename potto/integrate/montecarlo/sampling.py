@@ -20,7 +20,7 @@ from msgspec.structs import replace
 from potto.integrate.adaptive.iterated import Iteration
 from potto.integrate.degenerate.undefined import guarded_samples
 from potto.integrate.events import BUDGET_SPENT, NO_SAMPLE
-from potto.integrate.fixed.alike import by_shapes
+from potto.integrate.fixed.cells.alike import by_shapes
 from potto.integrate.montecarlo.cube_map import Chart, Point
 from potto.integrate.montecarlo.rare_events import (
     MISSED,

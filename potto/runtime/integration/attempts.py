@@ -17,8 +17,8 @@ from msgspec.structs import replace
 
 from potto.core.terms import Integral
 from potto.integrate.events import BUDGET_SPENT, Events, OneSidedDerivatives, Shortfall
-from potto.integrate.fixed.a_priori import Crowded, beside_bounds, certain
-from potto.integrate.fixed.on_bounds import Tied
+from potto.integrate.fixed.proved_sums.a_priori import Crowded, beside_bounds, certain
+from potto.integrate.fixed.proved_sums.on_bounds import Tied
 from potto.integrate.pieces import Sums
 from potto.runtime.evaluation.machine import Machine
 from potto.runtime.evaluation.sides import SAME

@@ -34,9 +34,9 @@ from potto.core.terms import (
     var,
 )
 from potto.diagnostics import PottoError
-from potto.integrate.fixed.a_priori import proved_sum, settled
 from potto.integrate.fixed.moving_sums import MovingTotals
-from potto.integrate.fixed.settled import SettledRegion
+from potto.integrate.fixed.proved_sums.a_priori import proved_sum, settled
+from potto.integrate.fixed.proved_sums.settled import SettledRegion
 from potto.integrate.fixed.straight import StraightIntegral
 from potto.kernels.cells import Cell, Value, map_arrays, pad
 from potto.kernels.making import making

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 
 from potto.integrate.adaptive.iterated import Iteration
-from potto.integrate.fixed.alike import by_shapes
-from potto.integrate.fixed.uncut import uncut
+from potto.integrate.fixed.boxes.uncut import uncut
+from potto.integrate.fixed.cells.alike import by_shapes
 from potto.integrate.pieces import Sums, gather
 from potto.integrate.plan import Plan
 from potto.kernels.cells import Bools, Ints, Value

@@ -19,13 +19,13 @@ from typing import Any
 import numpy as np
 
 from potto.core.terms import children
-from potto.integrate.fixed.alone import machine_code, promotion, summed_alone
 from potto.integrate.fixed.moving_sums import MovingTotals, evaluated, summed
-from potto.integrate.fixed.on_bounds import OnBounds, Place, Tied
+from potto.integrate.fixed.proved_sums.alone import machine_code, promotion, summed_alone
+from potto.integrate.fixed.proved_sums.on_bounds import OnBounds, Place, Tied
+from potto.integrate.fixed.proved_sums.settled import SettledRegion, accurate
+from potto.integrate.fixed.proved_sums.sum_text import RepeatedSum
 from potto.integrate.fixed.regions import LOOSEST, Path, Places, known, region_of, settle
-from potto.integrate.fixed.settled import SettledRegion, accurate
 from potto.integrate.fixed.straight import CLEAR, StraightIntegral, nothing
-from potto.integrate.fixed.sum_text import RepeatedSum
 from potto.integrate.pieces import Evaluator, Sums
 from potto.integrate.rules.proved_orders import FrameCell as Stretch
 from potto.integrate.rules.proved_orders import Region

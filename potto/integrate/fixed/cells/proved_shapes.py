@@ -17,10 +17,10 @@ import numpy as np
 from msgspec import Struct
 
 from potto.integrate.columns import distinct
-from potto.integrate.fixed.product_rule import ProductRule
+from potto.integrate.fixed.cells.product_rule import ProductRule
+from potto.integrate.fixed.cells.topologies import Alike
 from potto.integrate.fixed.regions import LOOSEST, MARGIN, MOST_REGIONS
 from potto.integrate.fixed.straight import StraightIntegral
-from potto.integrate.fixed.topologies import Alike
 from potto.integrate.pieces import Evaluator
 from potto.integrate.rules.proved_orders import FrameCell as Stretch
 from potto.integrate.rules.proved_orders import proved_of_each

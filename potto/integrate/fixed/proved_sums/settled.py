@@ -17,10 +17,10 @@ from typing import Any
 import numpy as np
 from msgspec import Struct
 
-from potto.integrate.fixed.alone import LEFT, RegionPart
 from potto.integrate.fixed.moving_sums import MovingTotals, evaluated, summed
+from potto.integrate.fixed.proved_sums.alone import LEFT, RegionPart
+from potto.integrate.fixed.proved_sums.sum_text import RepeatedSum, SumText
 from potto.integrate.fixed.straight import StraightIntegral
-from potto.integrate.fixed.sum_text import RepeatedSum, SumText
 from potto.integrate.pieces import Evaluator
 from potto.integrate.rules.gauss import EPS
 from potto.integrate.rules.proved_orders import Region

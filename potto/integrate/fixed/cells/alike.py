@@ -15,11 +15,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from potto.integrate.fixed.cells.product_rule import CANCELS, FEW, ProductRule
+from potto.integrate.fixed.cells.proved_shapes import proved_rules
+from potto.integrate.fixed.cells.topologies import Alike, topologies
 from potto.integrate.fixed.moving_sums import evaluated
-from potto.integrate.fixed.product_rule import CANCELS, FEW, ProductRule
-from potto.integrate.fixed.proved_shapes import proved_rules
 from potto.integrate.fixed.straight import StraightIntegral
-from potto.integrate.fixed.topologies import Alike, topologies
 from potto.integrate.pieces import Evaluator, Sums, added_up, gather, together
 from potto.kernels.cells import Array, Bools, Cell, Ints, Value
 

@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 
 from potto.core.terms import Term
 from potto.integrate.fixed.axes import MEAN, Axis, axis
+from potto.integrate.fixed.cells.product_rule import ELSEWHERE, TRACKED
 from potto.integrate.fixed.lowered import LoweredCells, frame_of, lowered_cells
 from potto.integrate.fixed.moving_sums import SUMMED, MovingTotals, summed
-from potto.integrate.fixed.product_rule import ELSEWHERE, TRACKED
 from potto.integrate.fixed.straight import StraightIntegral
 from potto.integrate.pieces import Evaluator
 from potto.integrate.rules.proved_orders import FrameCell as Stretch
