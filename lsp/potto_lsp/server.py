@@ -15,7 +15,7 @@ from concurrent.futures import Future
 from functools import partial
 from typing import Any
 
-from potto_lsp import errors
+from potto_lsp import errors, memory
 from potto_lsp.asking import Ask, about, uri_of
 from potto_lsp.carrier import StreamServer, settle
 from potto_lsp.client import Client
@@ -98,7 +98,7 @@ class Server(StreamServer):
         client = Client(params)
         self.documents.encoding = client.encoding
         self.session = ClientSession(client, self.notify, self.request, self.later)
-        self.worker = Worker(self.session.load, self.session.idle, leave)
+        self.worker = Worker(self.session.load, self.session.idle, leave, memory.rest)
         self.worker.start()
         if client.process is not None:
             from potto_lsp.parent import watch

@@ -114,6 +114,7 @@ class ClientSession:
             for number, step in enumerate(self.publisher.steps_again()):
                 if number == opened:
                     yield None
+                    yield memory.tidy
                 yield step
             yield None
         else:

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 logger = logging.getLogger(__name__)
 LONG = 0.05  # seconds after which an edit interrupts even a quick question
+REST = 1.0  # seconds without anything to do after which there is time for more
 PATIENCE = 8  # how often a job gives way to questions; after that it is finished first, or it might never be
 
 _claims = Lock()
@@ -59,7 +60,7 @@ class Worker:
     """A queue of jobs and the thread that does them.
 
     `idle` gives the steps of idle work, and a None after those that slow questions wait for. `dead` is called if the
-    thread cannot start.
+    thread cannot start, `rest` when there has been nothing to do for a while.
     """
 
     def __init__(
@@ -67,8 +68,9 @@ class Worker:
         start: Callable[[], Database],
         idle: Callable[[], Iterator[Callable[[], None] | None]],
         dead: Callable[[], None] = lambda: None,
+        rest: Callable[[], None] = lambda: None,
     ) -> None:
-        self._start, self._idle, self._dead = start, idle, dead
+        self._start, self._idle, self._dead, self._rest = start, idle, dead, rest
         self._db: Database | None = None
         self._inbox: SimpleQueue[Job | None] = SimpleQueue()
         self._quick: deque[Job] = deque()
@@ -127,7 +129,9 @@ class Worker:
         if self._slow and not self._urgent:
             return self._slow.popleft()
         if self._steps is None:
-            self._receive(wait=True)
+            if not self._receive(wait=True, seconds=REST):
+                self._rest()
+                self._receive(wait=True)
             return None
         try:
             step = next(self._steps)
@@ -143,18 +147,20 @@ class Worker:
             return None
         return Job("idle", lambda job: step())
 
-    def _receive(self, wait: bool) -> None:
+    def _receive(self, wait: bool, seconds: float | None = None) -> bool:
+        """Sort what has come, or what comes within so many seconds. Whether there was anything."""
+        found = False
         try:
             while True:
-                job = self._inbox.get(block=wait)
-                wait = False
+                job = self._inbox.get(wait, seconds)
+                wait, found = False, True
                 if job is not None:
                     waiting = {"slow": self._slow, "diagnosis": self._diagnoses}.get(job.kind, self._quick)
                     waiting.append(job)
                 if job is None or job.kind == "edit":
                     self._steps, self._urgent = self._idle(), True
         except Empty:
-            return
+            return found
 
     def check_again(self) -> None:
         """Start the idle work over."""

@@ -146,7 +146,7 @@ class Memo:
         self.before: Memo | None = None
         self.index, self.low, self.cyclic, self.provisional = -1, 0, False, False
         self.ring: tuple[Memo, ...] = ()
-        self.source = self
+        self.source: Memo | None = self
 
     def __repr__(self) -> str:
         return f"{self.query.name}({', '.join(short(arg) for arg in self.args)})"
@@ -159,11 +159,13 @@ class Memo:
 
     def kept(self) -> Memo | None:
         """This memo as it stands, for `before`. Of a member of a cycle nothing is kept: its answer rests on more than
-        what it has read."""
+        what it has read. Nobody reads what is kept, so it needs no `source`, and is freed with its last reference: as
+        its own source it would wait for the garbage collector, one of these for each query that an edit runs."""
         if self.value is GONE or self.verified_at < 0 or self.ring or self.durability:
             return None
         memo = Memo(self.query, self.args)
         memo.value, memo.deps, memo.leaves, memo.verified_at = self.value, self.deps, self.leaves, self.verified_at
+        memo.source = None
         return memo
 
     def recall(self, before: Memo, revision: int, changes: set[Node]) -> None:

@@ -97,7 +97,7 @@ class Sender:
             elif isinstance(dep, MappingEntry) and dep.source.query.travels:
                 below[self._number(dep, (self._views[dep.source][0], dep.key, None))] = None
             else:
-                for number in self._views[dep.source]:
+                for number in self._views[dep if isinstance(dep, Memo) else dep.source]:
                     below[number] = None
         if not memo.query.travels:
             return tuple(below)
