@@ -61,7 +61,7 @@ class Database(Engine):
                 self._last_changed[level] = self.revision
             old.durability = durability
             if differs:
-                renew(old, value, self.revision, self.revision - 1)
+                renew(old, value, self.revision)
                 self._changes[self.revision].add(old)
                 self._log("input", "input", (key,))
             return differs

@@ -71,8 +71,8 @@ class Query:
 
 
 class Former:
-    """A value that a node had, and the first and the last revision for which it was known to be right. Whoever read
-    the node between these read that value."""
+    """A value that a node had, and the first and the last revision in which it had it. Whoever was verified between
+    these rests on that value."""
 
     __slots__ = ("first", "last", "value")
 
@@ -193,14 +193,14 @@ class Memo:
         old, entries = self.value, self.entries or {}
         if self.changed_at >= 0:
             changes.add(self)
-        renew(self, value, revision, self.verified_at)
+        renew(self, value, revision)
         changed: Iterable[Any] = entries
         if isinstance(value, Parted) and isinstance(old, Parted):
             changed = value.may_differ(old) & entries.keys()
         for key in changed:
             entry, new = entries[key], value.get(key)
             if not same(entry.value, new):
-                renew(entry, new, revision, self.verified_at)
+                renew(entry, new, revision)
                 changes.add(entry)
 
     def put_error(self, durability: int, revision: int, changes: set[Node]) -> None:
@@ -278,14 +278,18 @@ Node = Input | Memo | MappingEntry
 Leaf = Node
 
 
-def renew(node: Node, value: Any, revision: int, seen: int) -> None:
-    """Give a node another value. `seen` is the last revision for which the one that it has was right."""
-    old, former, seen = node.value, node.former, min(seen, revision - 1)
+def renew(node: Node, value: Any, revision: int) -> None:
+    """Give a node another value.
+
+    The one that it has counts as right until now, also where the node itself was verified long ago: a reader that was
+    verified since, by what lies far below, rests on it all the same.
+    """
+    old, former = node.value, node.former
     node.again = None
     if former is not None and same(former.value, value):
         node.again, value = former, former.value
-    if old is not GONE and old is not MISSING and node.changed_at <= seen:
-        node.former = Former(old, node.changed_at, seen)
+    if old is not GONE and old is not MISSING and node.changed_at < revision:
+        node.former = Former(old, node.changed_at, revision - 1)
     node.value, node.changed_at = value, revision
 
 

@@ -3,11 +3,14 @@ both."""
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterator
 from threading import Event
 from typing import Any
 
+import pytest
 from lsp_client import Client
+from potto_lsp import work
 from potto_lsp.features import FEATURES
 from potto_lsp.work import PATIENCE, Job, Worker
 
@@ -68,6 +71,20 @@ def test_open_files_then_whole_files_then_the_rest() -> None:
     world.put("quick", "hover")
     world.worker.start()
     assert world.finished() == ["edit", "hover", "pull", "open 0", "open 1", "lenses", "tokens", "closed 0", "closed 1"]
+
+
+def test_rest_comes_once_when_there_has_been_nothing_to_do(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(work, "REST", 0.02)
+    world, rests = World(), list[int]()
+    world.worker = Worker(lambda: world.db, world.steps, rest=lambda: rests.append(len(world.done)))
+    world.put("edit", "edit")
+    world.worker.start()
+    world.finished()
+    time.sleep(0.2)
+    assert rests == [5]  # after the edit and its four steps
+    world.put("quick", "hover")
+    time.sleep(0.2)
+    assert rests == [5, 6]
 
 
 def test_every_edit_is_told_of_before_a_question_about_the_file() -> None:

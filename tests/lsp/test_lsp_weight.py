@@ -174,6 +174,24 @@ def test_what_was_loaded_is_never_collected_again() -> None:
         gc.set_threshold(*before)
 
 
+def test_new_objects_are_looked_through_once_open_files_have_been_told_of() -> None:
+    """Where that waits until a collection comes by itself, it comes in the middle of a key, and takes 10 to 40 ms."""
+    before = gc.get_threshold()
+    try:
+        memory.settle()
+        for look, generation, many in ((memory.tidy, 0, memory.YOUNG), (memory.rest, 1, memory.MIDDLE)):
+            gc.collect(generation)
+            looked = gc.get_stats()[generation]["collections"]
+            look()  # at nothing new
+            assert gc.get_stats()[generation]["collections"] == looked
+            made = [[] for _ in range(2 * many)] if generation == 0 else [gc.collect(0) for _ in range(many + 1)]
+            look()
+            assert made and gc.get_stats()[generation]["collections"] == looked + 1
+    finally:
+        gc.unfreeze()
+        gc.set_threshold(*before)
+
+
 @pytest.mark.parametrize("answer", [[{"lints": {"P0620": "off"}}], [None], "nonsense", None])
 def test_settings_are_asked_for(server: Server, uri: Uri, answer: Any) -> None:
     """A client that keeps its settings is asked for them, at the start and when they change; nonsense is no setting."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import sys
 import threading
 import time
@@ -115,6 +116,39 @@ def test_what_comes_back_is_recalled_by_those_who_asked_meanwhile() -> None:
         with db.recording() as events:
             assert length(db, "a") == long
         assert ran(events) == []
+
+
+def test_what_was_last_verified_from_far_below_is_recalled() -> None:
+    """Edits elsewhere verify `total` by the text that lies below, without a look at `length`."""
+    db = Database()
+    put(db, "a", "one")
+    assert total(db, "a") == 3
+    for elsewhere in ("x", "y"):
+        put(db, "unread", elsewhere)
+        assert total(db, "a") == 3
+    put(db, "a", "eleven")
+    assert total(db, "a") == 6
+    put(db, "a", "one")
+    with db.recording() as events:
+        assert total(db, "a") == 3
+    assert ran(events) == []
+
+
+@pytest.mark.parametrize("said", [("one", "eleven"), ("one", "eleven", "two", "eleven")])
+def test_what_is_kept_to_be_recalled_leaves_no_garbage(said: tuple[str, ...]) -> None:
+    """Memory that only the garbage collector frees makes it stop the program for long."""
+    db = Database()
+    put(db, "a", "one")
+    total(db, "a")
+    gc.collect()
+    gc.disable()
+    try:
+        for turn in range(50):
+            put(db, "a", said[turn % len(said)])
+            total(db, "a")
+        assert gc.collect() == 0
+    finally:
+        gc.enable()
 
 
 def test_what_rests_on_something_else_as_well_is_not_recalled() -> None:
