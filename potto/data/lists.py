@@ -1,8 +1,8 @@
 """JSON: numbers, lists that fill a box and objects, in each other as they come.
 
 Owns `nested`. A box of objects with the same names is an object of boxes, so that a list of objects is read as the
-columns of a table. What holds texts alone is left out, as in tables. Places are told by their path, `speed[3][0]`,
-counted from 0 as JSON's users do, and by their line.
+columns of a table. What holds texts alone, or `null` somewhere, is left out, as in tables. Places are told by their
+path, `speed[3][0]`, counted from 0 as JSON's users do, and by their line.
 """
 
 from __future__ import annotations
@@ -144,9 +144,31 @@ def _table(box: _Box) -> Table:
         raise malformed(f"the file holds no values: its {several} empty", hint=hint)
     fields = [(field, box.under(name)) for field, name in zip(identifiers(names), names)]
     texts = [field for field, under in fields if _of_texts(under.entries)]
-    if len(texts) == len(fields):
-        texts = []  # of which the first is told
-    return Table(tuple((field, _value(under)) for field, under in fields if field not in texts), tuple(texts))
+    gaps = {} if "null" not in box.text else {
+        field: _line(box.text, place) for field, under in fields if field not in texts and (place := _gap(under))
+    }  # fmt: skip
+    if len(texts) + len(gaps) == len(fields):
+        texts, gaps = [], {}  # of which the first is told
+    kept = ((field, _value(under)) for field, under in fields if field not in texts and field not in gaps)
+    return Table(tuple(kept), tuple(texts), tuple(gaps.items()))
+
+
+def _gap(box: _Box) -> Path | None:
+    """Where the first `null` stands among values or in the lists that they are; what stands in objects is theirs."""
+    for at, entry in enumerate(box.entries):
+        inner = _gap_within(entry, DEEPEST)
+        if inner is not None:
+            return (*box.place(at), *inner)
+    return None
+
+
+def _gap_within(entry: Any, levels: int) -> Path | None:
+    if entry is None:
+        return ()
+    if not isinstance(entry, list) or not levels:
+        return None
+    found = ((at, _gap_within(item, levels - 1)) for at, item in enumerate(entry))
+    return next(((at, *inner) for at, inner in found if inner is not None), None)
 
 
 def _of_texts(entries: Sequence[Any]) -> bool:

@@ -321,8 +321,9 @@ def no_field(
         help += "in another column" if column else "under another name"
     if (line := dict(record.gaps).get(name)) is not None:
         label = "lacks values"
-        message = f"the column `{name}` of `{record.name}` has no value in line {line}"
-        help = "leave rows that lack a value out of the file, or write a number there"
+        column = "the column " if record.name.endswith(_TABLES) else ""
+        message = f"{column}`{name}` of `{record.name}` has no value in line {line}"
+        help = f"leave {'rows' if column else 'entries'} that lack a value out of the file, or write a number there"
     return kinds.UNKNOWN_FIELD(span, message, label=label, related=related, help=help, suggestions=instead(span, near))
 
 

@@ -136,6 +136,19 @@ def test_columns_of_text_and_places_beyond_the_end_are_shown_where_they_come_fro
     assert all(place in shown for place in places)
 
 
+def test_what_nothing_reads_of_a_json_file_may_be_null(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (folder / "people.json").write_text('[{"height": 1.5, "weight": 60},\n {"height": 2, "weight": null}]')
+    (folder / "means.po").write_text("""
+people = load("people.json")
+def height(t) t*(sum h in people.height (h))/2
+""")
+    assert float(potto.load(folder / "means.po").height(1.0)) == 1.75
+    (folder / "heavy.po").write_text('people = load("people.json")\nheavy = people.weight\n')
+    assert main(["check", str(folder / "heavy.po")]) == 1
+    shown = capsys.readouterr().out
+    assert "heavy.po:2:16: error[P0332]: `weight` of `people.json` has no value in line 2" in shown
+
+
 def test_a_column_that_nothing_reads_may_lack_values(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The mean of the heights is known, whatever is not of the weights; who asks for these is told the line."""
     (folder / "people.csv").write_text("height,weight\n1.5,60\n1.75,\n2,90\n")

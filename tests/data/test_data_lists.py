@@ -65,6 +65,30 @@ def test_texts_are_left_out() -> None:
     assert plain("d.json", json.dumps(rows)) == {"x": [1, 3], "at": {"y": [2, 4]}}
 
 
+@pytest.mark.parametrize(
+    ("text", "kept", "gaps"),
+    [
+        ('{"x": 1,\n"y": null}', {"x": 1}, (("y", 2),)),
+        ('[{"x": 1, "y": 2},\n{"x": 3,\n"y": null},\n{"x": 5, "y": null}]', {"x": [1, 3, 5]}, (("y", 3),)),
+        ('{"x": [[1, 2], [3, 4]],\n"y": [[1, 2],\n[null, 4]], "z": ["a", null]}', {"x": [[1, 2], [3, 4]]}, (("y", 3),)),
+        ('[{"x": 1, "p": {"y": 1}},\n{"x": 2, "p": null}]', {"x": [1, 2]}, (("p", 2),)),
+        ('{"x": 1, "y": "null", "z": 2}', {"x": 1, "z": 2}, ()),
+    ],
+)
+def test_what_lacks_values_is_left_out(text: str, kept: object, gaps: object) -> None:
+    found = values_of(Path("d.json"), text.encode())
+    assert isinstance(found, Table) and found.gaps == gaps
+    assert plain("d.json", text) == kept
+
+
+def test_an_object_within_one_leaves_out_what_it_lacks() -> None:
+    text = '{"camera": {"focal": 35,\n"gain": null}, "x": 1}'
+    found = values_of(Path("d.json"), text.encode())
+    assert isinstance(found, Table) and found.gaps == ()
+    assert isinstance(camera := found["camera"], Table) and camera.gaps == (("gain", 2),)
+    assert plain("d.json", text) == {"camera": {"focal": 35}, "x": 1}
+
+
 @given(
     st.recursive(
         st.one_of(numbers, st.none(), st.booleans(), st.text(max_size=2)),
@@ -86,7 +110,9 @@ def test_any_json_is_answered(data: Any) -> None:  # fmt: skip
         ("[1,\n [2]]", "P0803", 2, 2, "line 2, `[1]`: a list stands among numbers"),
         ('[1, "x, ]"]', "P0803", 1, 2, "line 1, `[1]`: `x, ]` is a text, not a number"),
         ("[true]", "P0803", 1, 1, "line 1, `[0]`: this is true or false, not a number"),
-        ('{"x": 1,\n"y": null}', "P0803", 2, None, "line 2, `y`: this is null, not a number"),
+        ("[1,\nnull]", "P0803", 2, 2, "line 2, `[1]`: this is null, not a number"),
+        ('{"y": null}', "P0803", 1, None, "line 1, `y`: this is null, not a number"),
+        ('[{"x": "a", "y": null}]', "P0803", 1, 1, "line 1, `[0].x`: `a` is a text, not a number"),
         ('[{"x": 1},\n{"x": null}]', "P0803", 2, 2, "line 2, `[1].x`: this is null, not a number"),
         ('[{"x": 1},\n{"y": 2}]', "P0803", 2, 2, "line 2, `[1]`: the object has `y`, and the first one `x`"),
         ('[{"x": 1},\n7]', "P0803", 2, 2, "line 2, `[1]`: this stands among objects"),
