@@ -26,7 +26,7 @@ def _session(server: Server) -> Any:
 def initialized(server: Server, params: Any) -> None:
     """The client can now be asked."""
     session = _session(server)
-    if session.client.can("workspace.didChangeWatchedFiles.dynamicRegistration"):
+    if session.watched:
         watchers = [{"globPattern": pattern} for pattern in PATTERNS]
         registration = {
             "id": "potto-files",
@@ -104,13 +104,12 @@ def did_close(server: Server, params: Any) -> None:
 def did_save(server: Server, params: Any) -> None:
     """Look at the disk again, for clients that don't watch files."""
     key = to_key(params["textDocument"]["uri"])
-    watched = _session(server).client.can("workspace.didChangeWatchedFiles.dynamicRegistration")
 
     def saved() -> None:
         session = _session(server)
         session.to_keep.add(key)
-        if not watched:
-            session.analysis.files.refresh((key,))
+        if not session.watched:
+            session.analysis.files.refresh((key, *session.analysis.files.data_files()))
 
     server.edit(saved)
 

@@ -98,13 +98,27 @@ class Server(StreamServer):
         client = Client(params)
         self.documents.encoding = client.encoding
         self.session = ClientSession(client, self.notify, self.request, self.later)
-        self.worker = Worker(self.session.load, self.session.idle, leave, memory.rest)
+        self.worker = Worker(self.session.load, self.session.idle, leave, self._rest)
         self.worker.start()
         if client.process is not None:
             from potto_lsp.parent import watch
 
             watch(client.process)
         return greeting
+
+    def _rest(self) -> bool:
+        """What there is time for while nothing is to be done; whether there will be more of it."""
+        memory.rest()
+        return self._look_at_data()
+
+    def _look_at_data(self) -> bool:
+        """Notice files of data that have changed without a word; whether there are any that may."""
+        assert self.session is not None and self.worker is not None
+        if not self.session.looks_at_data:
+            return False
+        if self.session.data_changed():
+            self.worker.check_again()
+        return True
 
     def _noted(self, method: str, handle: Handler, params: Any) -> None:
         """A notification."""
@@ -165,6 +179,7 @@ class Server(StreamServer):
         return ask.analysis.document(ask.file) is not document
 
     def _answer(self, future: Future[Any], job: Job, feature: Feature, ask: Ask, document: Document | None) -> None:
+        self._look_at_data()
         version = self._version(feature, ask, document)
         if self._crashes.is_off(version):
             _finish(future, job)

@@ -6,6 +6,7 @@ Everything but `notify` and `request` belongs to the thread that owns the databa
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterator, Mapping
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -15,6 +16,7 @@ from potto_lsp.client import Client
 from potto_lsp.features import FEATURES
 from potto_lsp.presenting import Presenter
 from potto_lsp.progress import WorkProgress
+from potto_lsp.work import REST
 
 if TYPE_CHECKING:
     from potto.query import Database
@@ -49,6 +51,7 @@ class ClientSession:
         self.presenter = Presenter(self)
         self.tokens: dict[str, Colours] = {}
         self.checked = False
+        self._looked = 0.0  # when files of data were looked at
         self.to_prepare: set[str] = set()  # files that were opened
         self._unknown_lints: list[str] = []
         self.to_keep: set[str] = set()  # saved files whose diagnostics are to be kept for later sessions
@@ -176,6 +179,27 @@ class ClientSession:
             evaluator.close()
             self.analysis.dismiss_helpers()
         self.presenter.close()
+
+    @property
+    def watched(self) -> bool:
+        """Whether the client tells what happens to files on disk."""
+        return self.client.can("workspace.didChangeWatchedFiles.dynamicRegistration")
+
+    @property
+    def looks_at_data(self) -> bool:
+        """Whether files of data change without a word: programs read some, and the client does not watch them."""
+        return not self.watched and bool(self.analysis.files.data_files())
+
+    def data_changed(self) -> bool:
+        """Look at the files of data that programs read, once a second; whether any is another one now."""
+        now, files = time.monotonic(), self.analysis.files
+        if now - self._looked < REST:
+            return False
+        self._looked = now
+        changed = bool(files.refresh(files.data_files()))
+        if changed:
+            self.diagnostics_changed()
+        return changed
 
     def diagnostics_changed(self) -> None:
         """Diagnostics have changed for another reason than an edit."""

@@ -60,7 +60,7 @@ class Worker:
     """A queue of jobs and the thread that does them.
 
     `idle` gives the steps of idle work, and a None after those that slow questions wait for. `dead` is called if the
-    thread cannot start, `rest` when there has been nothing to do for a while.
+    thread cannot start, `rest` when there has been nothing to do for a while, and again as long as it says so.
     """
 
     def __init__(
@@ -68,7 +68,7 @@ class Worker:
         start: Callable[[], Database],
         idle: Callable[[], Iterator[Callable[[], None] | None]],
         dead: Callable[[], None] = lambda: None,
-        rest: Callable[[], None] = lambda: None,
+        rest: Callable[[], bool] = lambda: False,
     ) -> None:
         self._start, self._idle, self._dead, self._rest = start, idle, dead, rest
         self._db: Database | None = None
@@ -129,9 +129,9 @@ class Worker:
         if self._slow and not self._urgent:
             return self._slow.popleft()
         if self._steps is None:
-            if not self._receive(wait=True, seconds=REST):
-                self._rest()
-                self._receive(wait=True)
+            again = True
+            while not self._receive(wait=True, seconds=REST if again else None):
+                again = self._rest()
             return None
         try:
             step = next(self._steps)

@@ -256,9 +256,12 @@ def test_an_edit_elsewhere_evaluates_nothing(server: Server, uri: Uri) -> None:
     assert shown(client, uri("main"), {2})[2].startswith("= 0.04166")  # t^3/3 at 1/2
 
 
-def test_an_edited_file_of_data_counts_again(server: Server, uri: Uri, tmp_path: Path) -> None:
-    """Its values, its size and its hover; a broken row is told at the `load`."""
-    client = server(REFRESHES)
+@pytest.mark.parametrize("watches", [True, False])
+def test_an_edited_file_of_data_counts_again(server: Server, uri: Uri, tmp_path: Path, watches: bool) -> None:
+    """Its values, its size and its hover; a broken row is told at the `load`. Also where nobody says that it was
+    edited."""
+    workspace = {**REFRESHES["workspace"], "didChangeWatchedFiles": {"dynamicRegistration": watches}}
+    client = server({**REFRESHES, "workspace": workspace})
     heights = tmp_path / "heights.csv"
     heights.write_text("1\n2\n6\n")
     client.open(uri("main"), 'xs = load("heights.csv")\ndef mean(v: [n] Real) sum x in v (x)/n\n#> mean(xs)\n')
@@ -266,7 +269,8 @@ def test_an_edited_file_of_data_counts_again(server: Server, uri: Uri, tmp_path:
 
     def edited(text: str) -> None:
         heights.write_text(text)
-        client.tell("workspace/didChangeWatchedFiles", {"changes": [{"uri": heights.as_uri(), "type": 2}]})
+        if watches:
+            client.tell("workspace/didChangeWatchedFiles", {"changes": [{"uri": heights.as_uri(), "type": 2}]})
 
     assert shown(client, uri("main"), {2})[2] == "= 3"
     assert "[3] Real" in client.ask("textDocument/hover", hover)["contents"]["value"]

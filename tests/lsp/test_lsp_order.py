@@ -73,18 +73,23 @@ def test_open_files_then_whole_files_then_the_rest() -> None:
     assert world.finished() == ["edit", "hover", "pull", "open 0", "open 1", "lenses", "tokens", "closed 0", "closed 1"]
 
 
-def test_rest_comes_once_when_there_has_been_nothing_to_do(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_rest_comes_when_there_has_been_nothing_to_do(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(work, "REST", 0.02)
     world, rests = World(), list[int]()
-    world.worker = Worker(lambda: world.db, world.steps, rest=lambda: rests.append(len(world.done)))
+
+    def rest() -> bool:
+        rests.append(len(world.done))
+        return len(rests) in (1, 2)
+
+    world.worker = Worker(lambda: world.db, world.steps, rest=rest)
     world.put("edit", "edit")
     world.worker.start()
     world.finished()
-    time.sleep(0.2)
-    assert rests == [5]  # after the edit and its four steps
+    time.sleep(0.4)
+    assert rests == [5, 5, 5]  # after the edit and its four steps, as often as it asks for more
     world.put("quick", "hover")
-    time.sleep(0.2)
-    assert rests == [5, 6]
+    time.sleep(0.4)
+    assert rests == [5, 5, 5, 6]
 
 
 def test_every_edit_is_told_of_before_a_question_about_the_file() -> None:
