@@ -1,9 +1,9 @@
 """Calls with numbers near those of before: from arguments to the answer with nothing in between but its rule.
 
 Owns `AtOnce` and `at_once`, and for batches `Together` and `together`. Where a call is nothing but an integral, or
-arithmetic with some, and all about them is settled in the region where its numbers lie
-(`integrate/fixed/settled`), the general way has nothing left to find out. What it told once about such a call,
-it would tell again. A batch of numbers goes from its arrays to the integral.
+arithmetic with some, and all about them is settled in the region where its numbers lie (`proved_sums/settled`), the
+general way has nothing left to find out. What it told once about such a call, it would tell again. A batch of numbers
+goes from its arrays to the integral.
 """
 
 from __future__ import annotations

@@ -1,6 +1,7 @@
 """Symbols that are typed as `\\theta` and a tab, and how answers use them.
 
-Owns `SYMBOLS`, `expanded_before` and `pretty`. Everything that is inserted can be read by Potto.
+Owns `SYMBOLS`, `typed`, `expanded`, `named`, `pretty`, `ascii_only` and `readable`. Everything that is
+inserted can be read by Potto.
 """
 
 from __future__ import annotations

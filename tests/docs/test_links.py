@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
+CODE, LARGE = ROOT / "potto", ("calculus", "integrate", "runtime")
 PAGES = [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").rglob("*.md"))]
 
 
@@ -52,6 +53,15 @@ def test_links_lead_somewhere(page: Path) -> None:
             titles = list(headings(there))
             for slug in (on_the_site, in_the_repository):
                 assert heading in map(slug, titles), f"{file}#{heading}"
+
+
+@pytest.mark.parametrize("page", [page for page in PAGES if page.parent.name != "errors"], ids=lambda page: page.name)
+def test_code_that_pages_name_is_there(page: Path) -> None:
+    """`integrate/plan`, `rules/jets.py`, `calculus/solving/solve.factors`: in `potto`, or in one of its large rooms."""
+    for room, rest in re.findall(r"`(\w+)/([\w/]+)(?:\.\w+)?`", prose(page)):
+        homes = [home / room for home in (CODE, *(CODE / large for large in LARGE)) if (home / room).is_dir()]
+        named = [path for home in homes for path in (home / rest, home / f"{rest}.py")]
+        assert not named or any(path.exists() for path in named), f"{room}/{rest}"
 
 
 def test_the_check_itself(tmp_path: Path) -> None:

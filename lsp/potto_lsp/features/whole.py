@@ -1,6 +1,6 @@
 """Answers about whole files, put together from pieces that are kept in the form in which they are sent.
 
-Owns `PieceItems`, `part_of`, `whole` and `Pieces`. After a key all parts but one are the same; those below it are moved
+Owns `PieceItems`, `part_of`, `lined` and `whole`. After a key all parts but one are the same; those below it are moved
 if lines were added or removed.
 """
 

@@ -1,6 +1,6 @@
 """Arrays while a program runs: all elements at once, along an axis in front of the batch; elements at places.
 
-Owns `array`, `element`, `length` and `at_places`.
+Owns `array`, `element` and `length`.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """An integral at parameters for which it is known on which side of some surfaces all of it lies: without these.
 
-Owns `on_known_sides`. Where surfaces cut the variables, and meet each other, is found out for all parameters at once,
+Owns `sided`. Where surfaces cut the variables, and meet each other, is found out for all parameters at once,
 which takes the longest of all that is made of a program. A pixel that most of a scene passes by needs none of that: an
 enclosure tells on which side it lies, and what is left is an integral with few surfaces, or with none. There are as
 many such integrals as sides that have been met; after some of them the whole is made, which is for all others.
