@@ -153,6 +153,10 @@ class FormulaText:
         moved = [self.total(self.times(x, g[0]), self.times(f[0], y)) for x, y in zip(f[1:], g[1:], strict=True)]
         return [self.times(f[0], g[0]), *moved]
 
+    def spread(self, whole: str) -> str:
+        """A whole number as a number, at all places."""
+        return self.at.spread(self.at.once(f"uitofp i64 {whole} to double", whole))
+
     # Memory
 
     def fill(self, memory: str, rows: str, each: int) -> None:

@@ -3,7 +3,8 @@
 Owns `LoweredCells`, and `frame_of` and `places_of`, which tell such functions what they work on. A function goes
 through the members eight at a time. In loops over the nodes of the variables, from the outermost to the innermost, it
 works out bounds, cuts, nodes and the integrand, and adds up Legendre coefficients on the way back: what numpy does to
-whole arrays, one after the other, is done here to eight numbers that stay in registers.
+whole arrays, one after the other, is done here to eight numbers that stay in registers. Where nothing is left to be
+decided beside it, what is found is added to the sums of members there as well.
 """
 
 from __future__ import annotations
@@ -20,11 +21,10 @@ from numpy.typing import NDArray
 from potto.core.terms import Term, postorder
 from potto.integrate.fixed.axes import Axis, Raw
 from potto.integrate.fixed.formula_text import ONE, ParameterPlace
-from potto.integrate.fixed.mean_text import MeanText
 from potto.integrate.fixed.rule_text import NAME, RuleText
 from potto.integrate.fixed.straight import RowNumbers, StraightIntegral
 from potto.integrate.pieces import Evaluator
-from potto.kernels.cells import Array, Cell, Ints, Value
+from potto.kernels.cells import Array, Bools, Cell, Ints, Value
 from potto.kernels.making import counts
 from potto.kernels.native.objects import Loaded
 from potto.kernels.native.points import address
@@ -35,26 +35,39 @@ from potto.kernels.native.vectors import LANES
 # Lines of a function's text at the least: in all, and for each term and for its tangent along each direction. There
 # are up to twice as many.
 LINES, LINES_OF_A_TERM = 400, 3
+# Cells whose integrals are added up at once: few enough that an interruption is not kept waiting.
+AT_ONCE = 1 << 15
+
+
+class Wanted(Struct, frozen=True):
+    """Which cells are good enough: those that are off by no more than a part of what they come to, or of what is added
+    up for them. whole: what a cell goes into counts as what it comes to. beside: how many times more rounding may be
+    than at the nodes where it is followed."""
+
+    part: float
+    added: float
+    whole: bool
+    beside: float
 
 
 class LoweredCells(Struct, frozen=True):
     """The rule for cells of one integrand with any number of nodes, for parameters with these parts.
 
-    told: whether coefficients tell what it leaves out; else that is known. lanes: how many cells it does at a time.
+    kind: what is written: with coefficients that tell what it leaves out, the means alone, or totals of members. lanes:
+    how many cells it does at a time.
     """
 
     plan: StraightIntegral
     face: Term
     places: tuple[ParameterPlace, ...]
-    told: bool
+    kind: type[RuleText]
     promotion: Promotion
     lanes: int = LANES
 
     def function(self, machine: Evaluator) -> Loaded | None:
         """The function, if it is to be used now."""
-        kind = RuleText if self.told else MeanText
         return self.promotion.function(
-            machine.backend, lambda: kind(self.plan, self.face, machine, self.lanes).text(self.places)
+            machine.backend, lambda: self.kind(self.plan, self.face, machine, self.lanes).text(self.places)
         )
 
     def run(
@@ -64,39 +77,61 @@ class LoweredCells(Struct, frozen=True):
         """The sums over cells. members: (M,), whose they are; rows: (variables, 2, M), of the frames, between which."""
         k1, count = 1 + directions, members.size
         numbers, arrays = given(self.places, env)
-        ends = [row.astype(float) for pair in rows for row in pair]
-        sizes = [self.rows(k1), *(axis.transform.shape[1] * k1 for axis in axes if self.told)]
+        sizes = [3 * k1 + self.kind.beside, *(axis.transform.shape[1] * k1 for axis in axes)]
         out = np.empty((sum(sizes), max(count, self.lanes)))
-        columns = [whole(column, out.shape[1]) for column in (members, *ends)]
-        columns[1:1] = map(np.ascontiguousarray, arrays)
-        frame = frame_of(out, axes, columns)
+        owners, *ends = [whole(column, out.shape[1]) for column in (members, *ends_of(rows))]
+        frame = frame_of(out, axes, [owners, *arrays, *ends])
         function.call(address(frame), address(numbers))
         counts.native_points += count * math.prod(len(axis.nodes) for axis in axes)
         found = out[:, :count]
         number, most, off, clear = found[:k1], found[k1 : 2 * k1], found[2 * k1 : 3 * k1], found[3 * k1] > 0
-        if not self.told:
-            return Raw(number, [], most, off, clear)
         corners, largest = found[3 * k1 + 1 : sizes[0]]
         parts = np.split(found[sizes[0] :], np.cumsum(sizes[1:])[:-1])
         coefficients = [part.reshape(-1, k1, count).transpose(1, 2, 0) for part in parts]
         return Raw(number, coefficients, most, off, clear, corners, largest)
 
-    def rows(self, k1: int) -> int:
-        """How many rows of results there are before those of coefficients."""
-        return 3 * k1 + (3 if self.told else 1)
+    def add(
+        self, function: Loaded, env: Mapping[str, Value], members: Ints, rows: RowNumbers, axes: Sequence[Axis],
+        wanted: Wanted, beyond: Array | None, total: Array,
+    ) -> Bools:  # fmt: skip
+        """Add the sums over those cells that are good enough to those of their members; which these are (M,).
+
+        beyond: what is left out of each, (1 + k, M). total: (4, 1 + k, B), numbers, what rounding puts them off, what
+        is added up, and what is left out.
+        """
+        numbers, arrays = given(self.places, env)
+        constants = np.concatenate(((wanted.part, wanted.added, wanted.beside), numbers))
+        least = max(members.size, self.lanes)
+        good, proved = np.empty((1, least)), beyond is not None
+        owners, *ends = [whole(column, least) for column in (members, *ends_of(rows))]
+        left = [whole(row, least) for row in beyond] if beyond is not None else []
+        for start, stop in parts(least, AT_ONCE):
+            some = [column[start:stop] for column in (owners, *ends, *left)]
+            told = total.strides[1] // total.itemsize, int(wanted.whole), int(proved), min(stop, members.size) - start
+            frame = frame_of(good[:, start:stop], axes, [*some[:1], *arrays, *some[1 : 1 + len(ends)]])
+            where = [address(column) for column in some[1 + len(ends) :]] or [0] * total.shape[1]
+            frame = np.array([*frame, address(total), *told, *where], dtype=np.int64)
+            function.call(address(frame), address(constants))
+        counts.native_points += members.size * math.prod(len(axis.nodes) for axis in axes)
+        return np.asarray(good[0, : members.size] > 0)
+
+
+def ends_of(rows: RowNumbers) -> list[NDArray[Any]]:
+    """The rows between which cells lie as columns of numbers."""
+    return [row.astype(float) for pair in rows for row in pair]
 
 
 def lowered_cells(
-    plan: StraightIntegral, face: Term, directions: int, env: Mapping[str, Value], told: bool,
+    plan: StraightIntegral, face: Term, directions: int, env: Mapping[str, Value], kind: type[RuleText],
     lanes: int = LANES,
 ) -> LoweredCells:  # fmt: skip
     """The rule for an integrand on cells, in an environment whose numbers have these parts."""
     places = places_of(plan.names, env)
-    key = (face, directions, places, told, lanes)
+    key = (face, directions, places, kind, lanes)
     found: LoweredCells | None = plan.lowered.get(key)
     if found is None:
         lines = LINES + LINES_OF_A_TERM * terms_of(plan, face) * (1 + directions)
-        found = plan.lowered[key] = LoweredCells(plan, face, places, told, Promotion(NAME, lines), lanes)
+        found = plan.lowered[key] = LoweredCells(plan, face, places, kind, Promotion(NAME, lines), lanes)
     return found
 
 
@@ -113,7 +148,7 @@ def frame_of(out: Array, axes: Sequence[Axis], columns: Sequence[NDArray[Any]]) 
     return np.array([*where, ends, *(x for axis in axes for x in _told(axis)), *map(address, columns)], dtype=np.int64)
 
 
-def whole(column: Array, least: int) -> Array:
+def whole(column: NDArray[Any], least: int) -> NDArray[Any]:
     """A column as a function reads it, of LANES numbers at least."""
     return np.ascontiguousarray(column) if column.size >= least else np.resize(column, least)
 
@@ -127,7 +162,8 @@ def parts(count: int, most: int) -> list[tuple[int, int]]:
 def given(places: Iterable[ParameterPlace], env: Mapping[str, Value]) -> tuple[Array, list[Array]]:
     """The parts of parameters that are numbers for all members, and those that differ from member to member."""
     numbers = [_part(env[place.name], place.part) for place in places if place.kind == "number"]
-    return np.array(numbers, dtype=float), [_part(env[p.name], p.part) for p in places if p.kind == "array"]
+    arrays = [np.ascontiguousarray(_part(env[p.name], p.part)) for p in places if p.kind == "array"]
+    return np.array(numbers, dtype=float), arrays
 
 
 def places_of(names: Iterable[str], env: Mapping[str, Value]) -> tuple[ParameterPlace, ...]:

@@ -15,9 +15,10 @@ from potto.integrate.fixed.rule_text import RuleText
 class MeanText(RuleText):
     """Writes the function, which is told the same as that with coefficients.
 
-    Rows of results: the integrals with their tangents, the most that is added up for each and what rounding puts it
-    off, and whether a cell is clear.
+    Of rows of results the last says whether a cell is clear.
     """
+
+    beside = 1
 
     def text(self, places: Sequence[ParameterPlace]) -> str:
         self.begin()

@@ -33,7 +33,12 @@ class RuleText(FormulaText):
 
     Behind the tables the frame tells whose cells they are, then where the columns are: those of parameters, a number
     for every member, and the rows of the ends of cells.
+
+    Rows of results: the integrals with their tangents, the most that is added up for each and what rounding puts it
+    off, then so many `beside`: whether a cell is clear, the largest value at corners, and at nodes; then coefficients.
     """
+
+    beside = 3
 
     def __init__(self, plan: StraightIntegral, face: Term, machine: Evaluator, lanes: int = LANES) -> None:
         super().__init__(machine, lanes)
@@ -61,8 +66,8 @@ class RuleText(FormulaText):
         """The parameters of the cells of a block, which are clear so far; between which rows they lie is noted."""
         at, start = self.at, self.columns
         self.clear = at.room(1)
-        members = at.wholes(at.at(at.address("%frame", start, "ptr"), self.first, "i64"))
-        here, rows = self.parameters(places, start + 1, 2 * len(self.plan.variables), members)
+        self.members = at.wholes(at.at(at.address("%frame", start, "ptr"), self.first, "i64"))
+        here, rows = self.parameters(places, start + 1, 2 * len(self.plan.variables), self.members)
         self.rows = list(zip(rows[::2], rows[1::2], strict=True))
         at.store(self.one, self.clear)
         return here

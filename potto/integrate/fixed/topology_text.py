@@ -183,7 +183,3 @@ class TopologyText(FormulaText):
         at = self.at
         fine = at.apply("or", mask, at.apply("not", there))
         at.store(at.apply("select", fine, at.load(self.sure), self.zero), self.sure)
-
-    def spread(self, whole: str) -> str:
-        """A whole number as a number, at all places."""
-        return self.at.spread(self.at.once(f"uitofp i64 {whole} to double", whole))

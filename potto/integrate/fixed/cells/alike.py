@@ -73,11 +73,11 @@ def _of_one_form(
     """The same where cuts of all have the same formulas."""
     here = {name: env[name] for name in plan.names}
     done = np.zeros(batch, dtype=bool)
-    total = [np.zeros((1 + machine.directions, batch)) for _ in range(4)]
+    total = np.zeros((4, 1 + machine.directions, batch))
     for start in range(0, batch, MEMBERS):
         stop = min(start + MEMBERS, batch)
         some = here if stop - start == batch else gather(here, np.arange(start, stop))
-        sums = [row[:, start:stop] for row in total]
+        sums = total[..., start:stop]
         done[start:stop], cells = topologies(plan, machine, some, stop - start)
         for cell in cells:
             fine = _settled(plan, degrees, machine, some, cell, sums, tight)
@@ -89,7 +89,7 @@ def _of_one_form(
     done &= _fine(machine, env, total)
     if not done.any():
         return None
-    number, truncated, rounding, gross = total
+    number, rounding, gross, truncated = total
     error = np.add(truncated, rounding, out=truncated)
     added = np.stack((gross[0], gross[1:].max(axis=0, initial=0.0)))
     if not done.all():
@@ -98,10 +98,10 @@ def _of_one_form(
     return done, Sums(number[None, 0], error[None, 0], number[None, 1:], error[None, 1:], gross=added)
 
 
-def _fine(machine: Evaluator, env: dict[str, Value], total: Sequence[Array]) -> Bools:
-    """Which members are as accurate as was asked for, by what was found for each: (1 + k, B) four times. Over large
+def _fine(machine: Evaluator, env: dict[str, Value], total: Array) -> Bools:
+    """Which members are as accurate as was asked for, by what was found for each: (4, 1 + k, B). Over large
     batches it is memory that takes time: what does for most is asked first."""
-    number, truncated, rounding, gross = total
+    number, rounding, gross, truncated = total
     whole = np.abs(number)
     whole[0] = np.abs(together(env, number[0]))
     asked = np.maximum(machine.atol, np.multiply(whole, machine.rtol, out=whole), out=whole)
@@ -124,7 +124,7 @@ def _fine(machine: Evaluator, env: dict[str, Value], total: Sequence[Array]) -> 
 
 def _settled(
     plan: StraightIntegral, degrees: Sequence[int | None], machine: Evaluator, env: dict[str, Value], cell: Alike,
-    total: Sequence[Array], tight: bool,
+    total: Array, tight: bool,
 ) -> Bools:  # fmt: skip
     """Add the integrals over cells of one shape to those of their members; for which of them that could be done."""
     fine = np.zeros(cell.members.size, dtype=bool)
@@ -143,8 +143,12 @@ def _settled(
     return fine
 
 
-def _applied(rule: ProductRule, env: dict[str, Value], todo: Ints, total: Sequence[Array], fine: Bools) -> Ints:
+def _applied(rule: ProductRule, env: dict[str, Value], todo: Ints, total: Array, fine: Bools) -> Ints:
     """Add what a rule gives for some of its cells, where it is good enough, and note that; those for which it isn't."""
+    good = rule.added(env, todo, total)
+    if good is not None:
+        fine[todo] = good
+        return todo[~good]
     step, left = max(1, POINTS // rule.span(env)), []
     if not rule.native(env):
         todo = todo[np.argsort(rule.cell.between.take(todo), kind="stable")]
@@ -152,7 +156,7 @@ def _applied(rule: ProductRule, env: dict[str, Value], todo: Ints, total: Sequen
         index = todo[start : start + step]
         found, owners = rule.applied(env, index), rule.cell.members.take(index)
         good = rule.good(found, total[0].take(owners, 1) if todo.size <= FEW else None)
-        parts = [found.number, found.truncated, found.rounding, found.gross]
+        parts = [found.number, found.rounding, found.gross, found.truncated]
         if not good.all():
             left.append(index[~good])
             for part in parts:

@@ -15,16 +15,18 @@ from msgspec import Struct
 from potto.integrate.fixed.axes import MEAN, Raw, axis
 from potto.integrate.fixed.cells.nodes import at_once
 from potto.integrate.fixed.cells.topologies import Alike
-from potto.integrate.fixed.lowered import LoweredCells, lowered_cells
+from potto.integrate.fixed.lowered import LoweredCells, Wanted, lowered_cells
 from potto.integrate.fixed.moving_sums import SUMMED
+from potto.integrate.fixed.rule_text import RuleText
 from potto.integrate.fixed.straight import StraightIntegral
+from potto.integrate.fixed.total_text import ELSEWHERE, TotalText
 from potto.integrate.pieces import Evaluator
 from potto.integrate.rules.gauss import analytic_truncation, telling
 from potto.kernels.cells import Array, Bools, Ints, Value
 
 STRAIGHT = (False, False)  # no end of a stretch is like a square root
-# At how many nodes rounding is followed at each; and how much more it may be elsewhere where it is at a few.
-TRACKED, ELSEWHERE = 1 << 12, 2.0
+# At how many nodes rounding is followed at each; at a few of them, where there are more.
+TRACKED = 1 << 12
 # How many times larger than at all nodes the integrand may be at the ends of stretches: else something narrow is there.
 PEAK = 8.0
 # A rule is good enough for a cell if what it may be off is this part of the accuracy asked for; for a few members, whom
@@ -37,12 +39,13 @@ CANCELS = 1e-13
 
 
 class Measured(Struct, frozen=True):
-    """Integrals over cells (1 + k, M), how far rules and rounding put them off, and what is added up for them."""
+    """Integrals over cells (1 + k, M), how far rounding puts them off, what is added up for them, and how far off the
+    rule is."""
 
     number: Array
-    truncated: Array
     rounding: Array
     gross: Array
+    truncated: Array
 
 
 class ProductRule(Struct, frozen=True):
@@ -65,11 +68,13 @@ class ProductRule(Struct, frozen=True):
         return math.prod(self.orders)
 
     def lowered(self, env: dict[str, Value]) -> LoweredCells:
-        return lowered_cells(self.plan, self.cell.face, self.machine.directions, env, not all(self.exact))
+        kind = TotalText if all(self.exact) else RuleText
+        return lowered_cells(self.plan, self.cell.face, self.machine.directions, env, kind)
 
     def native(self, env: dict[str, Value]) -> bool:
-        """Whether this is for machine code now."""
-        return self.lowered(env).function(self.machine) is not None
+        """Whether what nodes amount to is for machine code now, which of a rule that is known to do adds it up
+        itself."""
+        return not all(self.exact) and self.lowered(env).function(self.machine) is not None
 
     def span(self, env: dict[str, Value]) -> int:
         """How many numbers of a member are kept at a time: those at all nodes, or of coefficients alone."""
@@ -86,6 +91,21 @@ class ProductRule(Struct, frozen=True):
         """The integrals over some of the cells."""
         return self._measured(self._raw(env, index, self.asked), index, self.orders)
 
+    def added(self, env: dict[str, Value], index: Ints, total: Array) -> Bools | None:
+        """Add the integrals over some of the cells to those of their members, by machine code: which were good enough.
+        None where that is left to numpy, or coefficients tell. total: (4, 1 + k, B), as of what is `Measured`."""
+        way = self.lowered(env)
+        function = way.function(self.machine)
+        if function is None or not all(self.exact):
+            return None
+        self.machine.count(index.size * self.nodes)
+        several = self._several(index)
+        axes = [axis(order, MEAN, STRAIGHT, several) for order in self.orders]
+        wanted = Wanted(*self._parts, index.size <= FEW, ELSEWHERE if several else 1.0)
+        members, rows = self.cell.members.take(index), self.cell.rows.take(index, -1)
+        beyond = None if self.beyond is None else self.beyond.take(index, 1)
+        return way.add(function, env, members, rows, axes, wanted, beyond, total)
+
     def foreseen(self, env: dict[str, Value], index: Ints, others: Sequence[ProductRule]) -> Iterator[Bools]:
         """For which cells rules with no more nodes than this one would do, by its coefficients."""
         every = zip(self.orders, self.exact, strict=True)
@@ -98,7 +118,7 @@ class ProductRule(Struct, frozen=True):
         given, several = zip(self.orders, asked, turning, strict=True), self._several(index)
         axes = [axis(order, own, ends, several) for order, own, ends in given]
         way, members, rows = self.lowered(env), self.cell.members.take(index), self.cell.rows.take(index, -1)
-        function = way.function(self.machine)
+        function = None if all(self.exact) else way.function(self.machine)
         if function is not None:
             return way.run(function, env, members, rows, axes, self.machine.directions)
         with way.promotion.by_numpy():
@@ -120,11 +140,15 @@ class ProductRule(Struct, frozen=True):
         truncated[:, ~clear] = np.inf
         gross = np.maximum(raw.most, np.abs(raw.number))
         rounding = (ELSEWHERE if self._several(index) else 1.0) * raw.off + ELSEWHERE * SUMMED * gross
-        return Measured(raw.number, truncated, rounding, gross)
+        return Measured(raw.number, rounding, gross, truncated)
 
     def good(self, found: Measured, known: Array | None = None) -> Bools:
         """For which cells the rule does. known: what is known already of the whole that each goes into."""
         size = np.abs(found.number) if known is None else np.maximum(np.abs(found.number), np.abs(known))
-        asked = (TIGHT if self.tight else SHARE * self.machine.rtol) * size
-        least = (TIGHT if self.tight else CANCELS) * found.gross
-        return np.asarray((found.truncated <= np.maximum(asked, least)).all(axis=0))
+        part, added = self._parts
+        return np.asarray((found.truncated <= np.maximum(part * size, added * found.gross)).all(axis=0))
+
+    @property
+    def _parts(self) -> tuple[float, float]:
+        """What may be left out, as parts of the number and of what is added up."""
+        return (TIGHT, TIGHT) if self.tight else (SHARE * self.machine.rtol, CANCELS)

@@ -18,10 +18,12 @@ from numpy.typing import NDArray
 
 from potto.core.terms import Term
 from potto.integrate.fixed.axes import MEAN, Axis, axis
-from potto.integrate.fixed.cells.product_rule import ELSEWHERE, TRACKED
+from potto.integrate.fixed.cells.product_rule import TRACKED
 from potto.integrate.fixed.lowered import LoweredCells, frame_of, lowered_cells
+from potto.integrate.fixed.mean_text import MeanText
 from potto.integrate.fixed.moving_sums import SUMMED, MovingTotals, summed
 from potto.integrate.fixed.straight import StraightIntegral
+from potto.integrate.fixed.total_text import ELSEWHERE
 from potto.integrate.pieces import Evaluator
 from potto.integrate.rules.proved_orders import FrameCell as Stretch
 from potto.integrate.rules.proved_orders import Region
@@ -88,7 +90,7 @@ class RegionPart(Struct, frozen=True):
         rows = np.array([cell.rows for cell in self.cells], dtype=float)[lanes]  # (lanes, variables, 2)
         ends = [np.ascontiguousarray(rows[:, i, side]) for i in range(rows.shape[1]) for side in (0, 1)]
         nobody = np.zeros(lanes.size, dtype=np.int64)  # no parameter differs from cell to cell
-        out = np.empty((self.way.rows(self.k1), lanes.size))
+        out = np.empty((3 * self.k1 + MeanText.beside, lanes.size))
         frame = frame_of(out, self.axes, [nobody, *ends])
         constants = np.empty(len(self.reads))
         where = address(frame), address(constants)
@@ -187,7 +189,7 @@ def _face(plan: StraightIntegral, region: Region, machine: Evaluator, env: Mappi
     nodes = len(cells) * math.prod(every)
     axes = tuple(axis(order, MEAN, (False, False), nodes > TRACKED) for order in every)
     return RegionPart(
-        lowered_cells(plan, body, machine.directions, env, False, _lanes(len(cells))),
+        lowered_cells(plan, body, machine.directions, env, MeanText, _lanes(len(cells))),
         cells, axes, 1 + machine.directions, nodes,
     )  # fmt: skip
 
