@@ -188,6 +188,36 @@ def _over(below: Term, above: Term) -> Term:
     return div(above, below)
 
 
+def _parts(node: Prim, names: Names) -> tuple[Callable[..., Term], list[Term]]:
+    """What a term is made of in any order, and how it is put together."""
+    if node.op == "add":
+        return add, summands(node, names)
+    if node.op == "mul":
+        return mul, list(factors(node))
+    return lambda *terms: reduce(partial(prim, node.op), terms), _compared(node)
+
+
+def _same(node: Prim) -> list[Term]:
+    """The parts of an extreme that are extremes of the same kind."""
+    return [arg for arg in node.args if isinstance(arg, Prim) and arg.op == node.op]
+
+
+def _compared(term: Prim) -> list[Term]:
+    """What a term is the greatest, or the least, of."""
+    found: list[Term] = []
+    waiting: list[Term] = [term]
+    while waiting:
+        item = waiting.pop()
+        if isinstance(item, Prim) and item.op == term.op:
+            waiting.extend(reversed(item.args))
+        else:
+            found.append(item)
+    return found
+
+
+_EXTREMES = ("max", "min")
+
+
 class _Handed(Struct):
     """The one number that terms depend on variables `here` through, as far as they have been put.
 
@@ -204,8 +234,10 @@ class _Handed(Struct):
     def put(self, term: Term) -> Term:
         """The term with the number in place of what it is made of. Raises _MoreThanOne."""
         memo: dict[Term, Term] = {}
-        for node in postorder(term):
-            if self._mixed(node):
+        nodes = list(postorder(term))
+        within = {part for node in nodes if isinstance(node, Prim) and node.op in _EXTREMES for part in _same(node)}
+        for node in nodes:
+            if self._mixed(node) and node not in within:
                 memo[node] = self._rebuilt(node, memo)
         return memo[term] if term in memo else self._single(term)
 
@@ -213,9 +245,8 @@ class _Handed(Struct):
         return bool(node.free & self.here) and bool(node.free & self.inner)
 
     def _rebuilt(self, node: Term, memo: dict[Term, Term]) -> Term:
-        if isinstance(node, Prim) and node.op in ("add", "mul"):
-            together = add if node.op == "add" else mul
-            parts = summands(node, self.here | self.inner) if node.op == "add" else list(factors(node))
+        if isinstance(node, Prim) and node.op in ("add", "mul", *_EXTREMES):
+            together, parts = _parts(node, self.here | self.inner)
             known = [p for p in parts if not p.free & self.inner and p.free & self.here]
             others = [self._again(p, memo) for p in parts if p.free & self.inner or not p.free & self.here]
             return together(*others, self._single(together(*known))) if known else together(*others)

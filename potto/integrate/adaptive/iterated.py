@@ -67,6 +67,8 @@ class Iteration(Struct):
     tracked: bool = False
     extent: Extent | None = None
     face: Face | None = None
+    first: int = 0
+    further_in: float = 1.0
 
     @property
     def degrees(self) -> tuple[int | None, ...]:
@@ -109,7 +111,7 @@ class Iteration(Struct):
         work = PanelBatch(self, number, level, env, here, sides, machine, moving, batch, root, slack,
                           cuts.conflict, cuts.paired, cuts.rested)  # fmt: skip
         sums = integrated(work)
-        if not number and (lost_far_out := sums.undefined(batch)).size:
+        if number == self.first and (lost_far_out := sums.undefined(batch)).size:
             self.nearer(work, sums, lost_far_out)
         if collapsed:
             sums = count_collapsed(scene, collapsed, sums)
@@ -143,8 +145,8 @@ class Iteration(Struct):
             self, work.number, work.level, work.env, seg, sides, work.machine, work.moving, work.batch, work.root,
             work.slack, work.conflict, work.paired, work.rested,
         ))  # fmt: skip
-        again.e += left_out
-        again.et += left_out
+        again.e += self.further_in * left_out
+        again.et += self.further_in * left_out
         sums.put(members, again.pick(members))
 
     def count_events(self, scene: IteratedVariable, cuts: Cuts, sums: Sums) -> None:
@@ -238,6 +240,7 @@ class Iteration(Struct):
         number = next((n for n, own in enumerate(self.plan.levels) if own is level), None)
         near = None if number is None else concentrated(self.plan, number, env, lo, hi, batch)
         lo, hi, lost = near or (lo, hi, None)
+        lost = None if lost is None else self.further_in * lost
         summed = self.plan.over is not None and level is self.plan.levels[-1]
         rows = searched_rows(level, env, lo, hi, batch, machine, summed)
         return (rows + critical_rows(level, env, lo, hi, batch, machine) if critical else rows), lost

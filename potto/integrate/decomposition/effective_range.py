@@ -1,8 +1,8 @@
 """How much of an infinite range an integrand takes up: a density leaves next to nothing beyond some place.
 
-Owns `concentrated` and `pulled_in`. What the integrand is at most, on shells that grow around where it is concentrated,
-follows from its enclosure; where what all the shells farther out can hold is below rounding, nothing needs to be looked
-for, nor evaluated.
+Owns `concentrated`, `pulled_in` and `reaches`. What the integrand is at most, on shells that grow around where it is
+concentrated, follows from its enclosure; where what all the shells farther out can hold is below rounding, nothing
+needs to be looked for, nor evaluated.
 """
 
 from __future__ import annotations
@@ -70,6 +70,23 @@ def pulled_in(plan: Plan, number: int, env: dict[str, Value], seg: Segments, bat
     seg.kind[rows] = choose(seg.a[rows], seg.b[rows], seg.left[rows], seg.right[rows])
     left_out: Array = np.bincount(owner, lost[known], minlength=batch).astype(float)
     return left_out
+
+
+def reaches(plan: Plan, env: dict[str, Value]) -> tuple[dict[str, tuple[float, float]], float]:
+    """By variable of one integral whose range is infinite, a range beyond which there is next to nothing wherever the
+    variables further out are, infinite where none is known; and how much there is, at most."""
+    box = _box(plan, env, 1)
+    found: dict[str, tuple[float, float]] = {}
+    left_out = 0.0
+    for number, level in enumerate(own.level for own in plan.levels):
+        below, above = enclosure((level.lo, level.hi), box)
+        low, high = np.fmin(below[0], above[0]).reshape(1), np.fmax(below[1], above[1]).reshape(1)
+        if np.isinf(low).any() or np.isinf(high).any():
+            low, high, lost = _Range(plan, number, box, low, high).found(_volume(plan, number, box, 1))
+            left_out += float(lost[0])
+            found[level.variable] = float(low[0]), float(high[0])
+        box[level.variable] = low[:, None], high[:, None]
+    return found, left_out
 
 
 def _alike(plan: Plan, env: dict[str, Value], owner: Ints, low: Array, high: Array, batch: int) -> tuple[Ints, Ints]:

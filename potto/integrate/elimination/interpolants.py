@@ -25,6 +25,7 @@ ROUNDS, MOST = 40, 2000  # of halvings; pieces
 GAP = 1e-9
 BESIDE = 2.0**-40  # how far from its ends a piece is looked at, as a part of it: on them it may jump
 SEEN = 0.1  # of the largest value
+ROUNDED = 16  # how many roundings a number may be beyond the table that is on its end
 
 # From places (n,) with speeds, (k + 1, n) or none, to the function there: `Sums` of one component.
 Function = Callable[[Array, Array], Sums]
@@ -57,17 +58,19 @@ class InterpolantTable(Struct, frozen=True):
         return bool(self.met[0] >= SEEN * self.largest)
 
     def at(self, s: Cell, k: int, wide: int) -> Cell:
-        """V at numbers that move in `wide` directions, the first k of which are those of the parameters."""
+        """V at numbers that move in `wide` directions, the first k of which are those of the parameters; 0 beyond the
+        table, which holds all that matters."""
         shape = np.shape(s.v)
-        x = np.clip(np.ravel(s.v), self.x0[0], self.x1[-1])
+        x = np.clip(asked := np.ravel(s.v), self.x0[0], self.x1[-1])
         piece = np.searchsorted(self.x0[1:], x, side="right")
         seg = self.segments.pick(self.segment[piece])
         q, slope = _inverse(seg, x)
         width = (self.u1 - self.u0)[piece]
         z = np.clip(2 * (q - self.u0[piece]) / width - 1, -1.0, 1.0)
         p = np.polynomial.legendre.legvander(z, self.coefficients.shape[-1] - 1)
-        values = np.einsum("ni,cni->cn", p, self.coefficients[:, piece])
-        errors = self.error[:, piece]
+        within = np.abs(asked - x) <= ROUNDED * EPS * np.abs(x)
+        values = np.einsum("ni,cni->cn", p, self.coefficients[:, piece]) * within
+        errors = self.error[:, piece] * within
         v, e = values[0].reshape(shape), errors[0].reshape(shape)
         self.met[0] = max(self.met[0], np.abs(v).max(initial=0.0))
         if not wide:
@@ -78,7 +81,7 @@ class InterpolantTable(Struct, frozen=True):
             rate = s.t[d] if d < len(s.t) else None
             by = np.zeros(x.size) if rate is None else np.broadcast_to(np.asarray(rate), shape).reshape(-1)
             own, off = (values[1 + d], errors[1 + d]) if d < k else (np.zeros(x.size), np.zeros(x.size))
-            by = by - substitution.velocity(seg, label, d)[0][:, 0] if d < k else by
+            by = np.where(within, by - substitution.velocity(seg, label, d)[0][:, 0] if d < k else by, 0.0)
             with np.errstate(divide="ignore", invalid="ignore"):
                 moved = np.where(by == 0, 0.0, by / slope)
             t.append((own + moved * values[-1]).reshape(shape))
@@ -87,10 +90,10 @@ class InterpolantTable(Struct, frozen=True):
 
 
 def tabulated(
-    segments: Segments, k: int, function: Function, rtol: float, exhausted: Callable[[], bool]
+    segments: Segments, k: int, function: Function, rtol: float, exhausted: Callable[[], bool], even: bool
 ) -> InterpolantTable | None:  # fmt: skip
     """The function on the segments; None where it is not continuous, does not become smooth on pieces, or takes more
-    than there is."""
+    than there is. even: whether no part of them weighs more than others of its length, as a density does."""
     count = segments.a.size
     todo = (np.arange(count), np.zeros(count), np.ones(count))
     done: list[tuple[Ints, Array, Array, Array, Array, Array]] = []
@@ -105,7 +108,7 @@ def tabulated(
         before = lost[0] + error[0]
         lost[0] = np.maximum(lost[0], _off_at_the_ends(segments, todo, coefficients[0], function, rule))
         # What is off on a short piece counts little, even where what passes on numbers crowds them there like a root.
-        share = np.sqrt((todo[2] - todo[1]) * _lengths(segments)[todo[0]])
+        share = np.sqrt((todo[2] - todo[1]) * _lengths(segments)[todo[0]]) if even else 1.0
         coarse = (lost * share > np.maximum(rtol * largest[:, None], error)).any(axis=0)
         if turn + 1 == ROUNDS or total > MOST:
             rise = np.abs(coefficients[0] @ rule.ends @ (1.0, -1.0))

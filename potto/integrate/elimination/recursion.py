@@ -7,7 +7,7 @@ its table, and the cuts of the next step.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import lru_cache
 from typing import Any
 
@@ -16,7 +16,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from potto.calculus.algebra.affine import affine
-from potto.calculus.algebra.ranges import range_of
+from potto.calculus.algebra.ranges import ValueRange, range_of
 from potto.calculus.decomposition.elimination import EliminationStep, eliminate
 from potto.calculus.decomposition.surface_cuts import MOST_CENTERS, cut_along, points_of
 from potto.calculus.decomposition.sweep import Level, sweep
@@ -41,6 +41,7 @@ from potto.core.terms import (
 )
 from potto.integrate.adaptive.iterated import Iteration
 from potto.integrate.decomposition.cuts import Cuts
+from potto.integrate.decomposition.effective_range import reaches
 from potto.integrate.decomposition.vanishing import vanishing_of
 from potto.integrate.degenerate.degeneracies import BESIDE, does_jump
 from potto.integrate.elimination.interpolants import InterpolantTable, tabulated
@@ -68,6 +69,7 @@ WEIGHTED = function_of(if_(prim("eq", var("weight"), ZERO), ZERO, mul(var("weigh
 LOW, HIGH = "#low", "#high"
 # A place in the state of a step, as a surface, and what is there.
 Place = tuple[Term, Kind]
+Ranges = Mapping[str, tuple[float, float]]
 
 
 class Eliminated(Struct, frozen=True):
@@ -147,7 +149,7 @@ def _planned(
     levels, groups = group_levels(swept.levels)
     numbers = {j.path: (g.number, j.orientation) for g in groups for j in g.cut.jumps}
     vanishing = vanishing_of(body, numbers, weight)
-    plan = Plan(Outline(term, levels, groups, function_of(body), vanishing, hides))
+    plan = Plan(Outline(term, levels, groups, function_of(body), vanishing, hides), inlined=step.weight)
     places = (f for f in (*steps, *swept.outer) if f.critical is None)
     return plan, tuple((f.surface, f.kind) for f in places if step.state in f.surface.free)
 
@@ -178,37 +180,47 @@ class _Tabled(Iteration):
 
 
 def one_by_one(
-    known: Eliminated, machine: Any, env: dict[str, Value], affordable: int = AFFORDABLE
+    known: Eliminated, plan: Plan, machine: Any, env: dict[str, Value], affordable: int = AFFORDABLE
 ) -> Sums | None:  # fmt: skip
     """The integral, each step from the table of the next; None where one can't be made, or it takes more evaluations
-    than can be afforded."""
+    than can be afforded. plan: of the integral as a whole, which tells how much of an infinite range matters."""
     settings = machine.settings
     most = min(settings.max_evals, int(machine.record.spent) + affordable)
     finer = replace(settings, rtol=max(SHARE * settings.rtol, FINEST), atol=0.0, max_evals=most)
-    fine = machine.changed(settings=finer)
-    spans = _spans(known.steps, env)
+    ranges, left_out = reaches(plan, env)
+    sums = _passed_on(known, machine.changed(settings=finer), env, ranges)
+    if sums is not None:
+        sums.e += left_out
+        sums.et += left_out
+    return sums
+
+
+def _passed_on(known: Eliminated, fine: Any, env: dict[str, Value], ranges: Ranges) -> Sums | None:
+    """The integral by tables that are as accurate, as a part of their largest values, as `fine` asks for; None where
+    one can't be made. ranges: of variables whose range is infinite, what matters of it."""
+    spans = _spans(known.steps, env, ranges)
     further: InterpolantTable | Cell | None = None
     sums: Sums | None = None
-    rows = list(zip(known.plans, known.states, spans, strict=True))
-    for plan, state, span in reversed(rows):
+    for plan, state, span in reversed(list(zip(known.plans, known.states, spans, strict=True))):
         below = further
+        most = further.largest if isinstance(further, InterpolantTable) else 1.0
+        alone = _Tabled(plan, fine, START_ORDER, tracked=True, further=further, further_in=most)
         if state is None:
-            sums = _Tabled(plan, fine, START_ORDER, tracked=True, further=below).run(0, env, 1, {}, fine)
+            sums = alone.run(0, env, 1, {}, fine)
             (further,) = sums.cells(())
             if isinstance(below, InterpolantTable) and not below.seen:
                 return None
             continue
         # As one inside another: how much each may err is measured by the largest of all.
         inside = replace(plan, outline=replace(plan.outline, levels=(state, *plan.levels)))
-        iteration = _Tabled(inside, fine, START_ORDER, tracked=True, further=further)
-        further = _table(iteration, state, span, fine, env)
+        further = _table(replace(alone, plan=inside, first=1), state, span, fine, env, even=not ranges)
         if further is None or fine.exhausted() or (isinstance(below, InterpolantTable) and not below.seen):
             return None
     return sums
 
 
 def _table(
-    iteration: Iteration, state: LevelPlan, span: tuple[float, float], machine: Any, env: dict[str, Value]
+    iteration: Iteration, state: LevelPlan, span: tuple[float, float], machine: Any, env: dict[str, Value], even: bool
 ) -> InterpolantTable | None:  # fmt: skip
     env = {**env, LOW: Cell(span[0]), HIGH: Cell(span[1])}
     found, _ = iteration.cut(state, env, 1, machine, np.zeros(1, dtype=np.int64))
@@ -230,7 +242,7 @@ def _table(
 
     if found.conflict or not segments.a.size or (machine.directions and _jumps_at_an_end(found, function)):
         return None
-    return tabulated(segments, machine.directions, function, machine.rtol, machine.exhausted)
+    return tabulated(segments, machine.directions, function, machine.rtol, machine.exhausted, even)
 
 
 def _jumps_at_an_end(found: Cuts, function: Callable[[Array, Array], Sums]) -> bool:
@@ -247,8 +259,8 @@ def _jumps_at_an_end(found: Cuts, function: Callable[[Array, Array], Sums]) -> b
     return bool(does_jump(np.abs(above - below), np.abs(above[:, 1]) + np.abs(below[:, 1])).any())
 
 
-def _spans(steps: Sequence[EliminationStep], env: dict[str, Value]) -> list[tuple[float, float]]:
-    """Between which numbers the state of each step is."""
+def _spans(steps: Sequence[EliminationStep], env: dict[str, Value], ranges: Ranges) -> list[tuple[float, float]]:
+    """Between which numbers the state of each step is, as far as it matters."""
     box: dict[str, tuple[float, float]] = {}
     for name, value in env.items():
         if isinstance(value, Cell):
@@ -260,10 +272,13 @@ def _spans(steps: Sequence[EliminationStep], env: dict[str, Value]) -> list[tupl
         if step.state is not None and before is not None and before.passed is not None:
             span = box[step.state] = _span(before, before.passed, box)
         spans.append(span)
-        lo, hi = range_of(step.lo, box), range_of(step.hi, box)
-        box[step.variable] = (min(lo.lo, hi.lo), max(lo.hi, hi.hi))
+        box[step.variable] = ranges.get(step.variable) or _hull(range_of(step.lo, box), range_of(step.hi, box))
         before = step
     return spans
+
+
+def _hull(a: ValueRange, b: ValueRange) -> tuple[float, float]:
+    return min(a.lo, b.lo), max(a.hi, b.hi)
 
 
 def _span(step: EliminationStep, passed: Term, box: dict[str, tuple[float, float]]) -> tuple[float, float]:

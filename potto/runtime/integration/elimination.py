@@ -46,13 +46,13 @@ def _member(known: Eliminated, problem: Problem) -> Sums | None:
     def tabled(there: Problem) -> Sums:
         rows = []
         for i in range(there.batch):
-            found = one_by_one(known, there.machine, there.picked(np.array([i])).env)
+            found = one_by_one(known, problem.plan(), there.machine, there.picked(np.array([i])).env)
             if found is None:
                 raise _NotEvaluated
             rows.append(found)
         return Sums.joined(rows)
 
-    row = one_by_one(known, problem.machine, problem.env, AFFORDABLE)
+    row = one_by_one(known, problem.plan(), problem.machine, problem.env, AFFORDABLE)
     folds = problem.events.every(Fold)
     if row is None or not folds or not all(_outermost(fold, known) for fold, _ in folds):
         return row

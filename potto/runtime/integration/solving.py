@@ -73,6 +73,11 @@ def by_samples(problem: Problem) -> Sums | None:
     method = problem.machine.settings.method
     if placed_along(problem.term) is not None or (method not in ("mc", "qmc") and not too_many(problem)):
         return None
+    return _drawn(problem, method)
+
+
+def _drawn(problem: Problem, method: str) -> Sums:
+    """What samples tell."""
     from potto.integrate.montecarlo.sampling import sample
 
     plan = problem.plan()
@@ -120,8 +125,13 @@ def along_cuts(problem: Problem) -> Sums:
         return plain
     most = trial(problem)
     stopped: list[Attempt] = []
+    tables: list[Attempt] | None = None
     for order in preferred(problem):
         found = attempted(problem, order, most)
+        if most is not None and found.stopped and tables is None and not found.events.every(Degenerate):
+            tables = eliminated(problem) if passes_on(problem) else []
+            if tables and accurate(tables[0].sums, machine.rtol, machine):
+                return tables[0].sums
         if most is not None and found.stopped and uncertainty(found.sums) < PROMISING:
             found = best((found, attempted(problem, order, LONGER * most)))
         along = found.events.every(Degenerate)
@@ -132,16 +142,16 @@ def along_cuts(problem: Problem) -> Sums:
             if not worth_trials(problem):
                 break
     if stopped:
-        return with_all(problem, stopped, most)
+        return _by_samples_instead(problem, best(stopped)) or with_all(problem, stopped, most, tables or [])
     events.take(found.events, np.arange(problem.batch))
     return _along_axes(problem, problem.plan(order), found.sums)
 
 
-def with_all(problem: Problem, tried: list[Attempt], most: int | None) -> Sums:
+def with_all(problem: Problem, tried: list[Attempt], most: int | None, tables: list[Attempt]) -> Sums:
     """The best answer where trials in some orders of the variables did not come to an end, or to no bound: in the order
     of which most is known, or by tables, with more and more evaluations.
 
-    most: the evaluations that each trial took.
+    most: the evaluations that each trial took. tables: what they came to, if there are any.
     """
     machine, longer = problem.machine, list[Attempt]()
     if machine.overdrawn():  # so many cuts that the first nodes of a trial are more than there are
@@ -158,12 +168,21 @@ def with_all(problem: Problem, tried: list[Attempt], most: int | None) -> Sums:
             break  # those that are not accurate though they came to an end may be in another order
     if not longer or not longer[-1].stopped:
         return finished(problem, best((*tried, *longer)))
-    tables = eliminated(problem) if passes_on(problem) else []
-    if tables and accurate(tables[0].sums, max(ACCURATE, machine.rtol), machine):
-        return tables[0].sums
     if len(longer) == 1:
         longer.append(attempted(problem, longer[0].order, None))
     return finished(problem, best((*tried, *tables, *longer)))
+
+
+def _by_samples_instead(problem: Problem, found: Attempt) -> Sums | None:
+    """What samples tell of many variables, where no trial promises anything and they tell more."""
+    if not many(problem) or uncertainty(found.sums) <= PROMISING:
+        return None
+    apart = problem.apart()
+    drawn = _drawn(apart, problem.machine.settings.method)
+    if uncertainty(drawn) >= uncertainty(found.sums):
+        return None
+    problem.events.take(apart.events, np.arange(problem.batch))
+    return drawn
 
 
 def finished(problem: Problem, found: Attempt) -> Sums:
