@@ -27,7 +27,7 @@ from potto.python.tiles import LEAST
 from potto.runtime.answers.convergence import precise
 from potto.runtime.answers.estimate import Estimate
 from potto.runtime.evaluate import Clock, Program, bar, number, report, stats_of
-from potto.runtime.evaluation.duals import merge
+from potto.runtime.evaluation.derivatives.duals import merge
 from potto.runtime.evaluation.functions import Closure
 from potto.runtime.evaluation.machine import WATCHING, Machine
 from potto.runtime.evaluation.record import Record, watched

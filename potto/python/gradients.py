@@ -35,9 +35,9 @@ from potto.runtime.answers.estimate import Estimate
 from potto.runtime.answers.named import named
 from potto.runtime.answers.shown import named_answer
 from potto.runtime.evaluate import Clock, bar, number, report, told
+from potto.runtime.evaluation.derivatives.sides import as_a_whole
 from potto.runtime.evaluation.machine import Machine
 from potto.runtime.evaluation.record import Record
-from potto.runtime.evaluation.sides import as_a_whole
 from potto.types.types import REAL
 
 # Parameters, from which on a tape is swept back instead of carrying a tangent for each: it costs 2.5 to 3.4 values

@@ -33,11 +33,11 @@ from potto.runtime.answers.convergence import (
 from potto.runtime.answers.estimate import Estimate, OneSided
 from potto.runtime.answers.inherited_errors import rough, widened
 from potto.runtime.evaluation.arrays import array, element, length
-from potto.runtime.evaluation.duals import call_derivative, call_paired
+from potto.runtime.evaluation.derivatives.duals import call_derivative, call_paired
+from potto.runtime.evaluation.derivatives.kinks import note_kink
 from potto.runtime.evaluation.few_members import told_alone
-from potto.runtime.evaluation.folds import fold
+from potto.runtime.evaluation.folds.folds import fold
 from potto.runtime.evaluation.functions import Closure, Derivative
-from potto.runtime.evaluation.kinks import note_kink
 from potto.runtime.evaluation.linker import Linker, Named
 from potto.runtime.evaluation.machine import Machine, Semantics
 from potto.runtime.evaluation.record import BOXES_FOR_EVALUATIONS, Record

@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from potto.kernels.whole import ROUNDING, looked_through
-from potto.runtime.evaluation import steps
-from potto.runtime.evaluation.steps import carried, spread
+from potto.runtime.evaluation.folds import steps
+from potto.runtime.evaluation.folds.steps import carried, spread
 
 SHAPES = st.tuples(st.integers(1, 140), st.sampled_from([(), (3,)]), st.integers(1, 3), st.integers(0, 1000))
 

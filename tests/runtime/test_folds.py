@@ -15,7 +15,7 @@ from mpmath import mp, mpf
 
 import potto
 from potto.python import gradients
-from potto.runtime.evaluation import folds, linear
+from potto.runtime.evaluation.folds import folds, linear
 
 DIGITS = 400  # what is chaotic loses one in two steps
 

@@ -13,7 +13,7 @@ from potto.integrate.degenerate.kinks import lying_along
 from potto.integrate.events import BOUNDLESS, Along, Fold, OneSidedDerivatives, TwoSided
 from potto.integrate.pieces import Sums
 from potto.kernels.cells import Ints
-from potto.runtime.evaluation.beside import parameter_step
+from potto.runtime.evaluation.derivatives.beside import parameter_step
 from potto.runtime.integration.one_sided import beside
 from potto.runtime.integration.problem import Problem
 

@@ -20,8 +20,8 @@ from potto.integrate.events import BUDGET_SPENT, Events, OneSidedDerivatives, Sh
 from potto.integrate.fixed.proved_sums.a_priori import Crowded, beside_bounds, certain
 from potto.integrate.fixed.proved_sums.on_bounds import Tied
 from potto.integrate.pieces import Sums
+from potto.runtime.evaluation.derivatives.sides import SAME
 from potto.runtime.evaluation.machine import Machine
-from potto.runtime.evaluation.sides import SAME
 from potto.runtime.integration.choices import preferred
 from potto.runtime.integration.problem import Problem
 from potto.runtime.integration.quadrature import in_parts

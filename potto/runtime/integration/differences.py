@@ -16,7 +16,7 @@ from potto.core.terms import Integral
 from potto.integrate.events import OneSidedDerivatives
 from potto.integrate.pieces import Sums, still
 from potto.kernels.cells import Array, Value
-from potto.runtime.evaluation.beside import moved, moving
+from potto.runtime.evaluation.derivatives.beside import moved, moving
 from potto.runtime.integration.problem import Problem
 
 ROUGH = 1e-6  # from which relative error on another way is looked for

@@ -41,7 +41,7 @@ from potto.integrate.fixed.straight import StraightIntegral
 from potto.kernels.cells import Cell, Value, map_arrays, pad
 from potto.kernels.making import making
 from potto.runtime.answers.allowances import Allowance, allowance_of_one
-from potto.runtime.evaluation.duals import merge, split
+from potto.runtime.evaluation.derivatives.duals import merge, split
 from potto.runtime.evaluation.functions import Closure
 from potto.runtime.evaluation.linker import Linker
 from potto.runtime.evaluation.machine import Machine

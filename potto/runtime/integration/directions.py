@@ -13,7 +13,7 @@ import numpy as np
 
 from potto.integrate.pieces import INTO, OF, Sums
 from potto.kernels.cells import Bools, Cell, Ints, Number, Value, map_cells
-from potto.runtime.evaluation.beside import moving, one_direction
+from potto.runtime.evaluation.derivatives.beside import moving, one_direction
 from potto.runtime.integration.problem import Problem
 
 

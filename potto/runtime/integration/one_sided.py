@@ -35,7 +35,7 @@ from potto.integrate.events import (
 from potto.integrate.pieces import Sums, gather, still
 from potto.integrate.plan import Plan
 from potto.kernels.cells import Array, Bools, Cell, Ints, map_cells, pad
-from potto.runtime.evaluation.beside import (
+from potto.runtime.evaluation.derivatives.beside import (
     APART,
     NEARER,
     SAME,

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from potto.core.terms import Term, function_of
 from potto.kernels.cells import Value
+from potto.runtime.evaluation.derivatives.sides import as_a_whole
 from potto.runtime.evaluation.machine import Machine
-from potto.runtime.evaluation.sides import as_a_whole
 
 
 def together(machine: Machine, term: Term, env: dict[str, Value]) -> Value:

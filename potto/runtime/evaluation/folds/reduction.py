@@ -19,7 +19,7 @@ from potto.kernels.cells import Array, Cell, Env, Number, Value, all_arrays
 from potto.kernels.tape import Node, Untaped, linear
 from potto.kernels.whole import LARGEST, UNIT_ROUNDOFF, looked_through
 from potto.primitives import PRIMITIVES
-from potto.runtime.evaluation.kinks import ROUNDING
+from potto.runtime.evaluation.derivatives.kinks import ROUNDING
 from potto.runtime.evaluation.machine import Machine
 
 MOST_POINTS = 1 << 24

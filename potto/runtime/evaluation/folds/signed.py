@@ -1,6 +1,6 @@
 """Folds over states of many numbers: how far off they are, by samples of errors that are stepped along.
 
-Owns `stepped`. Where a state has too many numbers for the matrices of its steps (`runtime/evaluation/linear`), some
+Owns `stepped`. Where a state has too many numbers for the matrices of its steps (`linear`), some
 errors that it may have are carried as further tangents: to each, every step adds what it rounds off, with signs of its
 own. Two add up what all steps round off in one direction, the others have random signs. A multiple of the largest is
 the bound: not proved, but errors with regard to sign do not grow where the state does not.

@@ -31,8 +31,8 @@ from potto.kernels.cells import (
 )
 from potto.kernels.errors import Coincidence
 from potto.runtime.answers.allowances import NOTHING
-from potto.runtime.evaluation.beside import SAME as ALIKE
-from potto.runtime.evaluation.beside import Parts, approached, moved, one_direction, parameter_step
+from potto.runtime.evaluation.derivatives.beside import SAME as ALIKE
+from potto.runtime.evaluation.derivatives.beside import Parts, approached, moved, one_direction, parameter_step
 from potto.runtime.evaluation.linker import Linker
 from potto.runtime.evaluation.machine import Machine
 

@@ -19,8 +19,8 @@ from potto.core.terms import Fold, Lam
 from potto.kernels.cells import Array, Cell, Env, Rows, Value, all_arrays, all_cells, map_cells, pad, pattern
 from potto.kernels.tape import Node, linear
 from potto.kernels.whole import UNIT_ROUNDOFF, looked_through
+from potto.runtime.evaluation.folds.steps import carried, spread
 from potto.runtime.evaluation.machine import Machine
-from potto.runtime.evaluation.steps import carried, spread
 
 MOST_NUMBERS = 24  # of a state
 MOST_WORK = 1 << 22  # numbers of states, cubed, times steps: matrices are multiplied

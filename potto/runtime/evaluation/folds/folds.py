@@ -18,11 +18,11 @@ from potto.diagnostics import PottoError
 from potto.kernels.cells import Cell, Env, Number, Value, all_arrays, map_cells, pad, pattern
 from potto.kernels.native.stepping import Stepping
 from potto.kernels.whole import looked_through
-from potto.runtime.evaluation.linear import States, along, steps_at_once
+from potto.runtime.evaluation.folds.linear import States, along, steps_at_once
+from potto.runtime.evaluation.folds.reduction import reduced
+from potto.runtime.evaluation.folds.signed import can_be_sampled, stepped
 from potto.runtime.evaluation.machine import Machine
-from potto.runtime.evaluation.reduction import reduced
 from potto.runtime.evaluation.selection import Pick, apart
-from potto.runtime.evaluation.signed import can_be_sampled, stepped
 from potto.runtime.evaluation.sums import bounds
 
 STEPS = "steps"  # what a kernel's machine code for folds is kept under

@@ -14,11 +14,11 @@ from potto.kernels import errors
 from potto.kernels.cells import Cell, Rows, Trace, Value, map_cells
 from potto.kernels.tape import Untaped
 from potto.runtime.evaluation.arguments import fit, uncurried
-from potto.runtime.evaluation.compared import compared, held
+from potto.runtime.evaluation.derivatives.compared import compared, held
+from potto.runtime.evaluation.derivatives.second_derivatives import dual_function
+from potto.runtime.evaluation.derivatives.sides import as_a_whole
 from potto.runtime.evaluation.functions import Closure, Derivative, Paired, holds_functions
 from potto.runtime.evaluation.machine import Machine
-from potto.runtime.evaluation.second_derivatives import dual_function
-from potto.runtime.evaluation.sides import as_a_whole
 
 
 def call_derivative(

@@ -1,0 +1,1 @@
+"""Folds and reductions: states stepped one after the other, with their derivatives and errors for all steps at once."""
