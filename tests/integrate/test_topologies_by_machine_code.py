@@ -1,4 +1,4 @@
-"""The cells of many members that machine code finds are those that numpy finds.
+"""The cells of many members that machine code finds are those that numpy finds, where something is to be integrated.
 
 Both compare, subtract and bound the rounding of the same doubles, so that they agree about every cell and about who is
 plain; cuts repeat, lie on bounds, were divided by 0, or are no numbers (roots that are not there). Where one may be
@@ -11,9 +11,11 @@ import numpy as np
 import pytest
 
 import potto
+from potto.core.terms import children
 from potto.integrate.fixed.cells import topologies as module
 from potto.integrate.fixed.cells.topologies import in_order
 from potto.integrate.fixed.lowered_topologies import Found, LoweredTopologies
+from potto.integrate.fixed.straight import StraightIntegral, nothing
 from potto.kernels.cells import Cell
 
 pytest.importorskip("llvmlite")
@@ -33,14 +35,14 @@ def test_cells_are_the_same(program: str, monkeypatch: pytest.MonkeyPatch) -> No
     random = np.random.default_rng(1)
     count = 1000 if program == "three variables" else 5003  # no multiple of eight
     given = random.integers(-4, 7, (3, count)) / 4 + random.choice([0.0, 0.0, 1e-15, 1e-3], (3, count))
-    asked: list[tuple[Found, Found]] = []
+    asked: list[tuple[StraightIntegral, Found, Found]] = []
     by_machine_code = LoweredTopologies.run
 
     def both(way: LoweredTopologies, function, env, batch):
         plan, names = way.plan, way.plan.names
         here = {name: module._spread(env[name], batch, False) for name in names}
         found = by_machine_code(way, function, env, batch)
-        asked.append((module._found(plan, machines[-1], here, batch), found))
+        asked.append((plan, module._found(plan, machines[-1], here, batch), found))
         return found
 
     machines = []
@@ -56,16 +58,20 @@ def test_cells_are_the_same(program: str, monkeypatch: pytest.MonkeyPatch) -> No
     with potto.settings(backend="native"):
         f(*given)
     assert asked
-    for by_numpy, found in asked:
+    for plan, by_numpy, found in asked:
         assert (by_numpy.plain == found.plain).all()
-        assert _cells(by_numpy) == _cells(found)
-    assert any(len(found.members) for _, found in asked)
-    assert not all(found.plain.all() for _, found in asked) or program == "one variable"
+        assert _lit(plan, by_numpy) == _lit(plan, found)
+        assert len(found.members) == len(_lit(plan, found))  # of these few surfaces all sides are known
+    assert any(len(found.members) for *_, found in asked)
+    assert not all(found.plain.all() for *_, found in asked) or program == "one variable"
 
 
-def _cells(found: Found) -> list[tuple[int, ...]]:
+def _lit(plan: StraightIntegral, found: Found) -> list[tuple[int, ...]]:
+    """The cells in which something is to be integrated, in order."""
     columns = (found.members, *found.rows.reshape(2 * len(found.rows), found.members.size), found.sides)
-    return sorted(zip(*(column.tolist() for column in columns), strict=True))
+    cells = sorted(zip(*(column.tolist() for column in columns), strict=True))
+    count = len(children(plan.surfaces.body))
+    return [cell for cell in cells if not nothing(plan.face(tuple(bool(cell[-1] >> bit & 1) for bit in range(count))))]
 
 
 def test_what_may_be_anywhere_has_no_order() -> None:

@@ -28,7 +28,8 @@ AT_ONCE, ROOM = 1 << 11, 1 << 16
 
 class Found(Struct, frozen=True):
     """Which members are plain (B,), and the cells of these: rows (variables, 2, N) between which they lie, whose they
-    are (N,), and the sides of the surfaces in their middles, as numbers with a bit for each (N,)."""
+    are (N,), and the sides of the surfaces in their middles, as numbers with a bit for each (N,). Where nothing is to
+    be integrated, cells may be left out."""
 
     plain: Bools
     rows: RowNumbers
@@ -68,13 +69,12 @@ class LoweredTopologies(Struct, frozen=True):
         count = max(batch, LANES)
         columns, plain = [whole(column, count) for column in arrays], np.empty(count)
         step, found = max(LANES, min(AT_ONCE, ROOM // self.most // LANES * LANES)), []
-        room = np.empty((3, self.most * (step + 2 * LANES)), dtype=np.int64)
+        room = np.empty((3, self.most * (step + 2 * LANES) + 1), dtype=np.int64)
         for start, stop in parts(count, step):
             into = (plain[start:stop], *room, *(column[start:stop] for column in columns))
             frame = np.array([stop - start, min(stop, batch) - start, 0, *map(address, into)], dtype=np.int64)
             function.call(address(frame), address(constants))
-            cells = room[:, : frame[FOUND]]
-            cells = cells.compress(cells[2] >= 0, 1)
+            cells = room[:, : frame[FOUND]].copy()
             cells[0] += start
             found.append(cells)
         members, between, sides = np.concatenate(found, axis=1)

@@ -13,9 +13,9 @@ from collections.abc import Sequence
 import numpy as np
 from msgspec import Struct
 
-from potto.core.terms import children
+from potto.core.terms import children, postorder
 from potto.integrate.fixed.formula_text import Env, FormulaText, ParameterPlace, Symbol
-from potto.integrate.fixed.straight import CLEAR, ROW_BITS, StraightIntegral
+from potto.integrate.fixed.straight import CLEAR, ROW_BITS, StraightIntegral, nothing
 from potto.integrate.pieces import Evaluator
 from potto.kernels.native.elementary import module
 from potto.kernels.native.operations import NotStraight
@@ -29,6 +29,18 @@ COUNT, THERE, FOUND, PLAIN, OWNERS, BETWEEN, SIDES, HEAD = range(8)
 # that the order is not sure.
 FARTHEST = np.finfo(float).max / 2
 MOST_SIDES = 50  # of which a number can tell each
+# Up to how many sides, and terms that are looked at for them, it is told what is integrated there.
+TOLD, LOOKED_AT = 5, 1 << 12
+
+
+def lit_sides(plan: StraightIntegral) -> int | None:
+    """A bit for each combination of sides, which is a number with a bit for each surface, in which something is to be
+    integrated; None where there are too many."""
+    count = len(children(plan.surfaces.body))
+    if count > TOLD or len(postorder(plan.body)) << count > LOOKED_AT:
+        return None
+    faces = (plan.face(tuple(bool(code >> bit & 1) for bit in range(count))) for code in range(1 << count))
+    return sum(1 << code for code, face in enumerate(faces) if not nothing(face))
 
 
 class Ordered(Struct, frozen=True):
@@ -41,11 +53,12 @@ class Ordered(Struct, frozen=True):
 
 
 class TopologyText(FormulaText):
-    """Writes the function. The cells of eight members are put down side by side; who has none there has no sides."""
+    """Writes the function. Of the cells of eight members those are put down, one after the other, in which something is
+    to be integrated, as far as it is told by which sides that is."""
 
     def __init__(self, plan: StraightIntegral, machine: Evaluator) -> None:
         super().__init__(machine)
-        self.plan = plan
+        self.plan, self.lit = plan, lit_sides(plan)
         if len(children(plan.surfaces.body)) > MOST_SIDES:
             raise NotStraight("more surfaces than a number has bits")
 
@@ -166,12 +179,29 @@ class TopologyText(FormulaText):
             self.only(there, at.apply("gt", at.apply("abs", cell.v), self.near(cell)))
             above = at.apply("select", at.apply("gt", cell.v, self.zero), at.number(float(1 << bit)), self.zero)
             sides = at.apply("add", sides, above)
-        fresh = at.apply("and", there, self.fresh)
-        at.begin("1", at.any(fresh))
-        found = at.count_up("%frame", FOUND, LANES)
-        sides = at.apply("select", fresh, sides, at.number(-1.0))
-        for slot, value in ((OWNERS, self.owners), (BETWEEN, between), (SIDES, sides)):
-            at.store_wholes(value, at.at(at.address("%frame", slot, "ptr"), found, "i64"))
+        self.put(at.apply("and", there, self.fresh), (self.owners, between, sides))
+
+    def put(self, there: str, values: Sequence[str]) -> None:
+        """Put down whose a cell is, between which rows, and on which sides, for a mask of members."""
+        at = self.at
+        numbers = [at.once(f"fptosi {at.doubles} {value} to {at.whole_numbers}", value) for value in values]
+        if self.lit is not None:
+            shifted = f"lshr {at.whole_numbers} splat (i64 {self.lit}), {numbers[-1]}"
+            lit = at.once(f"trunc {at.whole_numbers} {at.once(shifted, numbers[-1])} to {at.masks}", numbers[-1])
+            there = at.apply("and", there, lit)
+        at.begin("1", at.any(there))
+        counted = at.at("%frame", FOUND, "i64")
+        places, found = (
+            [at.address("%frame", slot, "ptr") for slot in (OWNERS, BETWEEN, SIDES)],
+            at.let(f"load i64, ptr {counted}"),
+        )
+        for lane in range(LANES):  # what is put down for who has no cell there, the next one takes the place of
+            for place, number in zip(places, numbers, strict=True):
+                one = at.let(f"extractelement {at.whole_numbers} {number}, i32 {lane}")
+                at.line(f"store i64 {one}, ptr {at.at(place, found, 'i64')}")
+            more = at.let(f"extractelement {at.masks} {there}, i32 {lane}")
+            found = at.let(f"add i64 {found}, {at.let(f'zext i1 {more} to i64')}")
+        at.line(f"store i64 {found}, ptr {counted}")
         at.end()
 
     def surfaces(self, env: Env) -> list[Symbol]:

@@ -148,18 +148,6 @@ class Vectors:
     def store(self, value: str, place: str) -> None:
         self.line(f"store {self.doubles} {value}, ptr {place}, align 8")
 
-    def store_wholes(self, value: str, place: str) -> None:
-        """Put numbers as whole numbers."""
-        whole = self.once(f"fptosi {self.doubles} {value} to {self.whole_numbers}", value)
-        self.line(f"store {self.whole_numbers} {whole}, ptr {place}, align 8")
-
-    def count_up(self, memory: str, index: int, by: int) -> str:
-        """A whole number of a table before so much is added to it."""
-        place = self.at(memory, index, "i64")
-        found = self.let(f"load i64, ptr {place}")
-        self.line(f"store i64 {self.whole('add', found, by)}, ptr {place}")
-        return found
-
     def constant(self, memory: str, index: str | int) -> str:
         """A number of a table that never changes, at all places."""
         place = self.at(memory, index, "double")
