@@ -122,7 +122,7 @@ def edge() -> None:
 def native() -> None:
     """What it takes to load LLVM and to make machine code, and by how many points it pays."""
     import potto
-    from potto.integrate.fixed.rule_text import RuleText
+    from potto.integrate.fixed.lowered.rule_text import RuleText
     from potto.kernels.making import counts
     from potto.kernels.native import objects
 

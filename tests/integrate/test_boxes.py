@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import potto
-from potto.integrate.fixed.lowered_boxes import LoweredBoxes, Passed
+from potto.integrate.fixed.lowered.boxes import LoweredBoxes, Passed
 from potto.kernels.native import objects
 from potto.runtime.integration import quadrature
 

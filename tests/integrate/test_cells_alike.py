@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 import potto
-from potto.integrate.fixed.lowered import places_of
+from potto.integrate.fixed.lowered.cells import places_of
 from potto.kernels.cells import Cell
 
 PLAIN = np.linspace(-0.99, -0.01, 200)

@@ -14,7 +14,7 @@ import potto
 from potto.core.terms import children
 from potto.integrate.fixed.cells import topologies as module
 from potto.integrate.fixed.cells.topologies import in_order
-from potto.integrate.fixed.lowered_topologies import Found, LoweredTopologies
+from potto.integrate.fixed.lowered.topologies import Found, LoweredTopologies
 from potto.integrate.fixed.straight import StraightIntegral, nothing
 from potto.kernels.cells import Cell
 

@@ -2,7 +2,7 @@
 
 Owns `BoxIntegrand` and `integrated`. Of a polynomial the rule takes as many nodes per variable as its degree asks for;
 of anything else few, then more where the Legendre coefficients say that these were not enough. All nodes of so many
-boxes are evaluated at once. (`lowered_boxes` does the same by machine code.)
+boxes are evaluated at once. (`lowered.boxes` does the same by machine code.)
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from msgspec import Struct
 
 from potto.core.terms import Lam, Term
 from potto.integrate.columns import run_of
-from potto.integrate.fixed.box_text import NODE_ROUNDING
+from potto.integrate.fixed.lowered.box_text import NODE_ROUNDING
 from potto.integrate.fixed.straight import StraightIntegral
 from potto.integrate.pieces import Evaluator, Sums, components, gather
 from potto.integrate.rules.gauss import EPS, gauss, truncation

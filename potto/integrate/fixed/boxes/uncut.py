@@ -1,7 +1,7 @@
 """Members of a batch that nothing cuts, integrated.
 
 Owns `uncut`. Such a box needs no cuts and has no boundary terms: what is integrated over it is the integrand on those
-sides on which it lies (`sides`), by a product rule: by numpy (`tensor_product`), or by machine code (`lowered_boxes`),
+sides on which it lies (`sides`), by a product rule: by numpy (`tensor_product`), or by machine code (`lowered.boxes`),
 which finds out about the sides on its way, or is told them where that takes more than arithmetic. What is not shown to
 be smooth and accurate here is left to the ways that cut.
 """
@@ -15,11 +15,11 @@ import numpy as np
 
 from potto.core.terms import Term, function_of, tuple_
 from potto.integrate.columns import distinct
-from potto.integrate.fixed.box_text import DONE, Look
 from potto.integrate.fixed.boxes.sides import UNCLEAR, Box, Sides, sides_of
 from potto.integrate.fixed.boxes.tensor_product import ORDERS, BoxIntegrand, integrated
-from potto.integrate.fixed.lowered import places_of
-from potto.integrate.fixed.lowered_boxes import LoweredBoxes, Passed
+from potto.integrate.fixed.lowered.box_text import DONE, Look
+from potto.integrate.fixed.lowered.boxes import LoweredBoxes, Passed
+from potto.integrate.fixed.lowered.cells import places_of
 from potto.integrate.fixed.straight import nothing
 from potto.integrate.pieces import Evaluator, Sums, gather
 from potto.kernels.cells import Array, Cell, Ints, Value

@@ -15,11 +15,11 @@ from msgspec import Struct
 from potto.integrate.fixed.axes import MEAN, Raw, axis
 from potto.integrate.fixed.cells.nodes import at_once
 from potto.integrate.fixed.cells.topologies import Alike
-from potto.integrate.fixed.lowered import LoweredCells, Wanted, lowered_cells
+from potto.integrate.fixed.lowered.cells import LoweredCells, Wanted, lowered_cells
+from potto.integrate.fixed.lowered.rule_text import RuleText
+from potto.integrate.fixed.lowered.total_text import ELSEWHERE, TotalText
 from potto.integrate.fixed.moving_sums import SUMMED
-from potto.integrate.fixed.rule_text import RuleText
 from potto.integrate.fixed.straight import StraightIntegral
-from potto.integrate.fixed.total_text import ELSEWHERE, TotalText
 from potto.integrate.pieces import Evaluator
 from potto.integrate.rules.gauss import analytic_truncation, telling
 from potto.kernels.cells import Array, Bools, Ints, Value

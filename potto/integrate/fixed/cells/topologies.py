@@ -17,10 +17,10 @@ from msgspec import Struct
 
 from potto.core.terms import Term, children
 from potto.integrate.columns import distinct
-from potto.integrate.fixed.lowered_topologies import Found, lowered_topologies
+from potto.integrate.fixed.lowered.topologies import Found, lowered_topologies
+from potto.integrate.fixed.lowered.topology_text import FARTHEST
 from potto.integrate.fixed.moving_sums import evaluated
 from potto.integrate.fixed.straight import CLEAR, ROW_BITS, RowNumbers, StraightIntegral, nothing
-from potto.integrate.fixed.topology_text import FARTHEST
 from potto.integrate.pieces import Evaluator, gather
 from potto.kernels.cells import Array, Bools, Cell, Ints, Number, Value
 

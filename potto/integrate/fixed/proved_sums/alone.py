@@ -1,8 +1,8 @@
 """The rule of a region (`a_priori`) by machine code, for one set of parameters.
 
-Owns `summed_alone`. What is a batch of members to the function (`lowered`) are here the cells of one integral, which
-differ in nothing but the rows of the frames between which they lie. All that is the same at every call is laid out
-once: tables of nodes, rows, room for what comes out.
+Owns `summed_alone`. What is a batch of members to the function (`lowered.cells`) are here the cells of one integral,
+which differ in nothing but the rows of the frames between which they lie. All that is the same at every call is laid
+out once: tables of nodes, rows, room for what comes out.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from numpy.typing import NDArray
 from potto.core.terms import Term
 from potto.integrate.fixed.axes import MEAN, Axis, axis
 from potto.integrate.fixed.cells.product_rule import TRACKED
-from potto.integrate.fixed.lowered import LoweredCells, frame_of, lowered_cells
-from potto.integrate.fixed.mean_text import MeanText
+from potto.integrate.fixed.lowered.cells import LoweredCells, frame_of, lowered_cells
+from potto.integrate.fixed.lowered.mean_text import MeanText
+from potto.integrate.fixed.lowered.total_text import ELSEWHERE
 from potto.integrate.fixed.moving_sums import SUMMED, MovingTotals, summed
 from potto.integrate.fixed.straight import StraightIntegral
-from potto.integrate.fixed.total_text import ELSEWHERE
 from potto.integrate.pieces import Evaluator
 from potto.integrate.rules.proved_orders import FrameCell as Stretch
 from potto.integrate.rules.proved_orders import Region

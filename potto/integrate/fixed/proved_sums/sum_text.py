@@ -19,7 +19,7 @@ import numpy as np
 from msgspec import Struct
 
 from potto.core.terms import Lam, Term, function_of
-from potto.integrate.fixed.lowered import terms_of
+from potto.integrate.fixed.lowered.cells import terms_of
 from potto.integrate.fixed.moving_sums import SUMMED
 from potto.integrate.fixed.straight import StraightIntegral
 from potto.integrate.pieces import Evaluator

@@ -1,4 +1,4 @@
-"""The text of a function that integrates over boxes which nothing cuts (`lowered_boxes`), as LLVM reads it.
+"""The text of a function that integrates over boxes which nothing cuts (`boxes`), as LLVM reads it.
 
 Owns `Look` and `BoxText`. A function works out the bounds of each member, on which side of every surface its box lies,
 and by a product rule what is integrated there; what is integrated may be a tuple of numbers. How far off the rule is is
@@ -14,8 +14,8 @@ from functools import reduce
 from msgspec import Struct
 
 from potto.core.terms import Lam, Term, Tuple, children, function_of
-from potto.integrate.fixed.formula_text import ParameterPlace, Symbol
-from potto.integrate.fixed.rule_text import RuleText
+from potto.integrate.fixed.lowered.formula_text import ParameterPlace, Symbol
+from potto.integrate.fixed.lowered.rule_text import RuleText
 from potto.integrate.fixed.straight import StraightIntegral
 from potto.integrate.pieces import Evaluator
 from potto.integrate.rules.gauss import EPS, gauss

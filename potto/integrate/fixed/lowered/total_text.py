@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from potto.integrate.fixed.formula_text import ParameterPlace
-from potto.integrate.fixed.mean_text import MeanText
+from potto.integrate.fixed.lowered.formula_text import ParameterPlace
+from potto.integrate.fixed.lowered.mean_text import MeanText
 from potto.integrate.fixed.moving_sums import SUMMED
 
 # Of the constants, the first ones: what is good enough, as parts of the number and of what is added up; and how many

@@ -1,4 +1,4 @@
-"""The text of a product rule (`lowered`), as LLVM reads it.
+"""The text of a product rule (`cells`), as LLVM reads it.
 
 Owns `RuleText`. In loops over the nodes of the variables, from the outermost to the innermost, bounds, cuts, nodes and
 the integrand are worked out, and Legendre coefficients added up on the way back. A formula is worked out in the
@@ -15,7 +15,7 @@ import numpy as np
 from potto.core.terms import Term, function_of
 from potto.integrate.fixed.axes import ENDS
 from potto.integrate.fixed.edges import EDGE, edges_of
-from potto.integrate.fixed.formula_text import Dual, Env, FormulaText, ParameterPlace, Symbol, still
+from potto.integrate.fixed.lowered.formula_text import Dual, Env, FormulaText, ParameterPlace, Symbol, still
 from potto.integrate.fixed.straight import StraightIntegral
 from potto.integrate.pieces import Evaluator
 from potto.integrate.rules.gauss import EPS

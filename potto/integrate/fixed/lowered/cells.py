@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 
 from potto.core.terms import Term, postorder
 from potto.integrate.fixed.axes import Axis, Raw
-from potto.integrate.fixed.formula_text import ONE, ParameterPlace
-from potto.integrate.fixed.rule_text import NAME, RuleText
+from potto.integrate.fixed.lowered.formula_text import ONE, ParameterPlace
+from potto.integrate.fixed.lowered.rule_text import NAME, RuleText
 from potto.integrate.fixed.straight import RowNumbers, StraightIntegral
 from potto.integrate.pieces import Evaluator
 from potto.kernels.cells import Array, Bools, Cell, Ints, Value

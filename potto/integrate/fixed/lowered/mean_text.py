@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from potto.integrate.fixed.formula_text import Dual, Env, ParameterPlace
-from potto.integrate.fixed.rule_text import RuleText
+from potto.integrate.fixed.lowered.formula_text import Dual, Env, ParameterPlace
+from potto.integrate.fixed.lowered.rule_text import RuleText
 
 
 class MeanText(RuleText):

@@ -11,10 +11,10 @@ from collections.abc import Mapping
 import numpy as np
 from msgspec import Struct, field
 
-from potto.integrate.fixed.formula_text import ParameterPlace
-from potto.integrate.fixed.lowered import given, parts, places_of, whole
+from potto.integrate.fixed.lowered.cells import given, parts, places_of, whole
+from potto.integrate.fixed.lowered.formula_text import ParameterPlace
+from potto.integrate.fixed.lowered.topology_text import FOUND, NAME, TopologyText
 from potto.integrate.fixed.straight import ROW_BITS, RowNumbers, StraightIntegral
-from potto.integrate.fixed.topology_text import FOUND, NAME, TopologyText
 from potto.integrate.pieces import Evaluator
 from potto.kernels.cells import Bools, Ints, Value
 from potto.kernels.native.objects import Loaded

@@ -1,4 +1,4 @@
-"""The text of a function that finds the cells of many members (`lowered_topologies`), as LLVM reads it.
+"""The text of a function that finds the cells of many members (`topologies`), as LLVM reads it.
 
 Owns `TopologyText`. In loops over the stretches of the variables, from the outermost to the innermost, bounds and cuts
 are worked out and put in order, then the sides of surfaces in the middle of each cell. What numpy does for all members
@@ -14,7 +14,7 @@ import numpy as np
 from msgspec import Struct
 
 from potto.core.terms import children, postorder
-from potto.integrate.fixed.formula_text import Env, FormulaText, ParameterPlace, Symbol
+from potto.integrate.fixed.lowered.formula_text import Env, FormulaText, ParameterPlace, Symbol
 from potto.integrate.fixed.straight import CLEAR, ROW_BITS, StraightIntegral, nothing
 from potto.integrate.pieces import Evaluator
 from potto.kernels.native.elementary import module

@@ -13,10 +13,10 @@ import numpy as np
 from msgspec import Struct, field
 
 from potto.integrate.fixed.axes import axis
-from potto.integrate.fixed.box_text import CROSSED, DARK, DONE, LEFT, BoxText, Look, numbers, rows_of
-from potto.integrate.fixed.formula_text import ParameterPlace
-from potto.integrate.fixed.lowered import frame_of, given, parts, whole
-from potto.integrate.fixed.rule_text import NAME
+from potto.integrate.fixed.lowered.box_text import CROSSED, DARK, DONE, LEFT, BoxText, Look, numbers, rows_of
+from potto.integrate.fixed.lowered.cells import frame_of, given, parts, whole
+from potto.integrate.fixed.lowered.formula_text import ParameterPlace
+from potto.integrate.fixed.lowered.rule_text import NAME
 from potto.integrate.pieces import Evaluator, Sums
 from potto.kernels.cells import Array, Bools, Ints, Value
 from potto.kernels.making import counts
