@@ -66,13 +66,13 @@ def _loaded(term: Data) -> Value:
 
 
 def _culled(machine: Machine, term: Sum, first: int, last: int, env: dict[str, Value]) -> Value | None:
-    from potto.runtime.integration.culling import culled
+    from potto.runtime.integration.preparation.culling import culled
 
     return culled(machine, term, first, last, env)
 
 
 def _added(machine: Machine, terms: tuple[Term, ...], env: dict[str, Value]) -> Value:
-    from potto.runtime.integration.summands import added
+    from potto.runtime.integration.methods.summands import added
 
     return added(machine, terms, env)
 
@@ -308,7 +308,9 @@ def _blamed(found: Shortfalls, record: Record, shape: tuple[int, ...], infinite:
 
 def _as_named(term: Term, machine: Machine) -> Term:
     """A term of an integral as the program would write it."""
-    from potto.runtime.integration.arrays import in_places  # loaded with the first integral: most answers have no notes
+    from potto.runtime.integration.preparation.arrays import (
+        in_places,  # loaded with the first integral: most answers have no notes
+    )
 
     return machine.linker.named(in_places(term))
 

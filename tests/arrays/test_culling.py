@@ -14,7 +14,7 @@ from polygons import Polygon, area, in_square
 
 import potto
 from potto.__main__ import main
-from potto.runtime.integration import culling
+from potto.runtime.integration.preparation import culling
 
 MESH = """
 def edge(a: (Real*, Real*), b: (Real*, Real*), x, y) (b.x - a.x)*(y - a.y) - (b.y - a.y)*(x - a.x)

@@ -9,7 +9,8 @@ import pytest
 import potto
 from potto.integrate.costs import counting
 from potto.integrate.fixed import at_sight
-from potto.runtime.integration import choices, problem
+from potto.runtime.integration import problem
+from potto.runtime.integration.methods import choices
 
 SCENE = Path(__file__).resolve().parents[2] / "examples" / "raytrace" / "main.po"
 DISC = """

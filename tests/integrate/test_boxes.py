@@ -11,7 +11,7 @@ import pytest
 import potto
 from potto.integrate.fixed.lowered.boxes import LoweredBoxes, Passed
 from potto.kernels.native import objects
-from potto.runtime.integration import quadrature
+from potto.runtime.integration.methods import quadrature
 
 needs_llvm = pytest.mark.skipif(not objects.available(), reason="llvmlite is not installed")
 

@@ -11,7 +11,7 @@ import pytest
 import potto
 from potto.integrate.pieces import Sums
 from potto.kernels.cells import Cell, Value
-from potto.runtime.integration.differences import _derivative
+from potto.runtime.integration.derivatives.differences import _derivative
 
 FUNCTIONS: list[tuple[Callable[[float], float], float | None]] = [
     (math.exp, math.e),

@@ -46,10 +46,10 @@ from potto.runtime.evaluation.functions import Closure
 from potto.runtime.evaluation.linker import Linker
 from potto.runtime.evaluation.machine import Machine
 from potto.runtime.evaluation.record import Record
-from potto.runtime.integration.arrays import met
-from potto.runtime.integration.choices import many, preferred, to_be_seen
 from potto.runtime.integration.driver import integrate
-from potto.runtime.integration.preparation import filled, placed, prepared
+from potto.runtime.integration.methods.choices import many, preferred, to_be_seen
+from potto.runtime.integration.preparation.arrays import met
+from potto.runtime.integration.preparation.prepared import filled, placed, prepared
 from potto.runtime.integration.problem import Mixed, Problem, linked
 from potto.runtime.integration.solving import solve
 

@@ -27,14 +27,14 @@ from potto.runtime.evaluation.functions import Chosen, choices, settled
 from potto.runtime.evaluation.local import locally
 from potto.runtime.evaluation.machine import Machine
 from potto.runtime.evaluation.selection import Pick, apart
-from potto.runtime.integration.arrays import Differ, Read, as_written, in_numbers, met, without_arrays
-from potto.runtime.integration.members import Whole
-from potto.runtime.integration.preparation import filled, held, placed, prepared
+from potto.runtime.integration.derivatives.rims import note_rims
+from potto.runtime.integration.methods.members import Whole
+from potto.runtime.integration.methods.summands import SAMPLED
+from potto.runtime.integration.preparation.arrays import Differ, Read, as_written, in_numbers, met, without_arrays
+from potto.runtime.integration.preparation.prepared import filled, held, placed, prepared
+from potto.runtime.integration.preparation.taken_apart import together
 from potto.runtime.integration.problem import Mixed, Problem, linked
-from potto.runtime.integration.rims import note_rims
 from potto.runtime.integration.solving import solve
-from potto.runtime.integration.summands import SAMPLED
-from potto.runtime.integration.taken_apart import together
 
 
 def integral(machine: Machine, term: Integral, env: dict[str, Value]) -> Value:

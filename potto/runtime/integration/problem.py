@@ -32,7 +32,7 @@ from potto.kernels.cells import Array, Bools, Cell, Ints, Value, map_arrays
 from potto.kernels.making import making
 from potto.runtime.evaluation.functions import Closure, Derivative
 from potto.runtime.evaluation.machine import Machine
-from potto.runtime.integration.known_sides import Sided, sided
+from potto.runtime.integration.preparation.known_sides import Sided, sided
 
 MOST_INTEGRALS = 1024
 MOST_LOOKED_AT = 8  # members that are each asked on which sides they lie

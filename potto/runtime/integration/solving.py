@@ -26,16 +26,31 @@ from potto.integrate.fixed.at_sight import at_sight
 from potto.integrate.pieces import Sums, still
 from potto.integrate.plan import Plan
 from potto.kernels.cells import Ints
-from potto.runtime.integration.at_kinks import at_kinks
-from potto.runtime.integration.attempts import Attempt, accurate, attempted, best, proved_beforehand, uncertainty
-from potto.runtime.integration.choices import many, passes_on, preferred, to_be_seen, too_many, trial, worth_trials
-from potto.runtime.integration.differences import by_differences
-from potto.runtime.integration.directions import by_directions
-from potto.runtime.integration.elimination import ACCURATE, WORTH, eliminated, step_by_step
-from potto.runtime.integration.members import by_members
-from potto.runtime.integration.one_sided import at_folds, beside_axes, on_both_sides
+from potto.runtime.integration.derivatives.at_kinks import at_kinks
+from potto.runtime.integration.derivatives.differences import by_differences
+from potto.runtime.integration.derivatives.one_sided import at_folds, beside_axes, on_both_sides
+from potto.runtime.integration.methods.attempts import (
+    Attempt,
+    accurate,
+    attempted,
+    best,
+    proved_beforehand,
+    uncertainty,
+)
+from potto.runtime.integration.methods.choices import (
+    many,
+    passes_on,
+    preferred,
+    to_be_seen,
+    too_many,
+    trial,
+    worth_trials,
+)
+from potto.runtime.integration.methods.directions import by_directions
+from potto.runtime.integration.methods.elimination import ACCURATE, WORTH, eliminated, step_by_step
+from potto.runtime.integration.methods.members import by_members
+from potto.runtime.integration.methods.second_looks import beside_another, by_less, in_another_order
 from potto.runtime.integration.problem import Problem
-from potto.runtime.integration.second_looks import beside_another, by_less, in_another_order
 
 # How many times what a trial took the most promising order gets before variables are eliminated, or it gets all that
 # there is: a torus takes 2.8 times as many evaluations, and tables of it 8 times. How uncertain a trial may leave an

@@ -15,7 +15,7 @@ from potto.diagnostics import PottoError
 from potto.kernels import errors
 from potto.runtime.evaluation.functions import Closure, Derivative, Paired
 from potto.runtime.evaluation.machine import Machine
-from potto.runtime.integration.uncounted import NOT_COUNTED
+from potto.runtime.integration.preparation.uncounted import NOT_COUNTED
 
 
 def dual_function(machine: Machine, function: Closure) -> Closure:

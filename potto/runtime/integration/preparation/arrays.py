@@ -43,7 +43,7 @@ from potto.runtime.evaluation.functions import Closure
 from potto.runtime.evaluation.machine import Machine
 from potto.runtime.evaluation.reach import Reach, kept
 from potto.runtime.evaluation.record import Record
-from potto.runtime.integration.uncounted import not_found
+from potto.runtime.integration.preparation.uncounted import not_found
 
 TOO_LONG = declare("P0515", "a loop under an integral is too long to be written out")
 

@@ -10,8 +10,8 @@ import numpy as np
 from potto.integrate.elimination.recursion import AFFORDABLE, Eliminated, one_by_one
 from potto.integrate.events import Fold
 from potto.integrate.pieces import Sums
-from potto.runtime.integration.attempts import Attempt, accurate
-from potto.runtime.integration.one_sided import beside_folds
+from potto.runtime.integration.derivatives.one_sided import beside_folds
+from potto.runtime.integration.methods.attempts import Attempt, accurate
 from potto.runtime.integration.problem import Problem
 
 # How accurate the answer must be, relatively, instead of that of iteration, and instead of that of samples.

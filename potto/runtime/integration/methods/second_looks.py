@@ -16,10 +16,10 @@ from potto.integrate.events import Degenerate, Fold, Shortfall, TwoSided, Unsear
 from potto.integrate.pieces import Sums
 from potto.kernels.cells import Array
 from potto.runtime.answers.convergence import missing
-from potto.runtime.integration.attempts import attempted, uncertainty
-from potto.runtime.integration.choices import orders
+from potto.runtime.integration.methods.attempts import attempted, uncertainty
+from potto.runtime.integration.methods.choices import orders
+from potto.runtime.integration.methods.quadrature import in_parts, iterated
 from potto.runtime.integration.problem import Problem
-from potto.runtime.integration.quadrature import in_parts, iterated
 
 ENOUGH = 1e-3  # a relative error from which on it is tried with less
 TOLERANCES = (1e-6, 1e-3)  # that are asked for instead, one after the other, until one is reached

@@ -57,8 +57,8 @@ from potto.kernels import errors
 from potto.kernels.cells import Cell, Rows, Value
 from potto.runtime.evaluation.functions import Closure, Derivative
 from potto.runtime.evaluation.reach import Reach, kept
-from potto.runtime.integration.arrays import holds
-from potto.runtime.integration.uncounted import NOT_COUNTED, not_found
+from potto.runtime.integration.preparation.arrays import holds
+from potto.runtime.integration.preparation.uncounted import NOT_COUNTED, not_found
 
 _FUNCTIONS = (Lam, Deriv, Global)
 FEW = 4  # branches that one integrand may have before its summands are integrated apart

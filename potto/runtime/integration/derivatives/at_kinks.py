@@ -14,7 +14,7 @@ from potto.integrate.events import BOUNDLESS, Along, Fold, OneSidedDerivatives, 
 from potto.integrate.pieces import Sums
 from potto.kernels.cells import Ints
 from potto.runtime.evaluation.derivatives.beside import parameter_step
-from potto.runtime.integration.one_sided import beside
+from potto.runtime.integration.derivatives.one_sided import beside
 from potto.runtime.integration.problem import Problem
 
 SAME = 1e-6  # how far apart both derivatives may be beside their errors, as a part of them, if there is but one

@@ -21,11 +21,11 @@ from potto.integrate.pieces import Sums
 from potto.kernels.cells import Array, Bools, Ints
 from potto.kernels.memory import kept
 from potto.runtime.answers.convergence import missing, rounded
-from potto.runtime.integration.attempts import proved_beforehand
-from potto.runtime.integration.choices import orders, preferred
-from potto.runtime.integration.directions import by_directions
+from potto.runtime.integration.methods.attempts import proved_beforehand
+from potto.runtime.integration.methods.choices import orders, preferred
+from potto.runtime.integration.methods.directions import by_directions
+from potto.runtime.integration.methods.quadrature import cut_up, iterated, whole_boxes
 from potto.runtime.integration.problem import Problem
-from potto.runtime.integration.quadrature import cut_up, iterated, whole_boxes
 
 # Up to how many members are done one by one, to the digits that each has by itself.
 FEW_MEMBERS = 10

@@ -27,8 +27,8 @@ from potto.runtime.answers.convergence import merged
 from potto.runtime.evaluation.functions import Closure
 from potto.runtime.evaluation.machine import Machine
 from potto.runtime.evaluation.reach import Reach, kept
-from potto.runtime.integration.arrays import holds, in_names
-from potto.runtime.integration.preparation import filled
+from potto.runtime.integration.preparation.arrays import holds, in_names
+from potto.runtime.integration.preparation.prepared import filled
 
 FEW = 512  # pairs, up to which all are evaluated
 PAIRS = 1 << 17  # evaluated together

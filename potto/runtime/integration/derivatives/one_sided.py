@@ -46,10 +46,10 @@ from potto.runtime.evaluation.derivatives.beside import (
     moving,
     parameter_step,
 )
-from potto.runtime.integration.attempts import accurate
-from potto.runtime.integration.choices import orders
+from potto.runtime.integration.methods.attempts import accurate
+from potto.runtime.integration.methods.choices import orders
+from potto.runtime.integration.methods.quadrature import iterated
 from potto.runtime.integration.problem import Mixed, Problem
-from potto.runtime.integration.quadrature import iterated
 
 # The parameters' steps that are tried, and how far apart what folds may be after one, as a part of the range.
 STEPS = 2.0 ** np.arange(-1000.0, 1001.0, 4.0)

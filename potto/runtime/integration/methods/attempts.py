@@ -22,9 +22,9 @@ from potto.integrate.fixed.proved_sums.on_bounds import Tied
 from potto.integrate.pieces import Sums
 from potto.runtime.evaluation.derivatives.sides import SAME
 from potto.runtime.evaluation.machine import Machine
-from potto.runtime.integration.choices import preferred
+from potto.runtime.integration.methods.choices import preferred
+from potto.runtime.integration.methods.quadrature import in_parts
 from potto.runtime.integration.problem import Problem
-from potto.runtime.integration.quadrature import in_parts
 
 
 def proved_beforehand(problem: Problem) -> Sums | None:

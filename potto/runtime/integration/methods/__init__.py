@@ -1,0 +1,1 @@
+"""Ways to integrate: along cuts, variables eliminated, members, directions or summands by themselves."""
