@@ -7,9 +7,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from potto.diagnostics import PottoError
-from potto.projects.settings import settings
-
 if TYPE_CHECKING:
     from potto_repl.magics import load_ipython_extension
     from potto_repl.sliders import sliders
@@ -19,7 +16,9 @@ if TYPE_CHECKING:
     from potto.bridges.to_jax import to_jax
     from potto.bridges.to_scipy import to_scipy
     from potto.bridges.to_torch import to_torch
+    from potto.diagnostics import PottoError
     from potto.integrate.costs import counting
+    from potto.projects.settings import settings
     from potto.python.api import Module, ProgramWarning, Workspace, compile, load
     from potto.python.functions import Function, deriv
     from potto.python.gradients import grad, jacobian, jvp, value_and_grad, vjp
@@ -60,6 +59,7 @@ _HOMES = {
     "Estimate": "potto.runtime.answers.estimate",
     "Function": "potto.python.functions",
     "Interrupted": "potto.python.tiles",
+    "PottoError": "potto.diagnostics",
     "counting": "potto.integrate.costs",
     "deriv": "potto.python.functions",
     "fit": "potto.applications.fitting",
@@ -69,6 +69,7 @@ _HOMES = {
     "jacobian": "potto.python.gradients",
     "jvp": "potto.python.gradients",
     "load_ipython_extension": "potto_repl.magics",
+    "settings": "potto.projects.settings",
     "sliders": "potto_repl.sliders",
     "to_jax": "potto.bridges.to_jax",
     "to_scipy": "potto.bridges.to_scipy",

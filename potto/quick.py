@@ -1,18 +1,18 @@
 """Values of the front end, which makes a hundred of them for every line of a program and can be compiled.
 
-Owns `value`, for classes that would be frozen dataclasses with slots: it makes them without generating text, in a
-twentieth of the time, which counts at every start, and their constructors take half as long, since they write through
-the descriptors of the slots. Where the front end is machine code the compiler takes them for dataclasses
-(`hatch_build.py`), and `machine` gives them the rest. Elsewhere values are structs of msgspec, which it does not know.
+Owns `value`, for classes that would be frozen dataclasses with slots. Interpreted they are structs of msgspec, which
+are made, compared and hashed in a fifth of the time. The compiler does not know these: where the front end is machine
+code it takes values for dataclasses (`hatch_build.py`), and `machine` gives them the rest.
 """
 
 from __future__ import annotations
 
 import copyreg
 from collections.abc import Callable
-from functools import cache
 from operator import attrgetter
 from typing import Any, TypeVar, dataclass_transform
+
+from msgspec import defstruct
 
 _T = TypeVar("_T")
 
@@ -23,19 +23,10 @@ def value(cls: type[_T]) -> type[_T]:
 
     Methods of its own count. It must have no bases, and its defaults are shared by all values.
     """
-    own = dict(vars(cls))
-    names = tuple(own.get("__annotations__", ()))
-    defaults = tuple(own.pop(name) for name in names if name in own)
-    for name in ("__dict__", "__weakref__"):
-        own.pop(name, None)
-    shared = {**_shared(names), "__reduce__": _reduce(_getter(names)), "__slots__": names}
-    made: Any = type(cls.__name__, (), {**shared, **own})
-    init = _template(len(names))(*(vars(made)[name].__set__ for name in names))
-    init.__code__ = init.__code__.replace(co_varnames=("self", *names))
-    init.__defaults__ = defaults
-    init.__qualname__ = f"{cls.__qualname__}.__init__"
-    made.__init__ = init
-    made.__qualname__ = cls.__qualname__
+    own = {name: member for name, member in vars(cls).items() if name not in ("__dict__", "__weakref__")}
+    types: dict[str, Any] = own.pop("__annotations__", {})
+    fields = [(name, types[name], own.pop(name)) if name in own else (name, types[name]) for name in types]
+    made: Any = defstruct(cls.__name__, fields, namespace=own, frozen=True)
     return made  # type: ignore[no-any-return]
 
 
@@ -68,17 +59,6 @@ def is_compiled(cls: type) -> bool:
 def _parts(value: Any) -> tuple[Any, ...]:
     """What a value is made from anew."""
     return type(value), tuple([getattr(value, name) for name in type(value).__match_args__])
-
-
-@cache
-def _template(count: int) -> Callable[..., Any]:
-    """Makes an `__init__` of so many fields from the writers of their slots; the names of its parameters follow."""
-    writers, values = [f"w{n}" for n in range(count)], [f"v{n}" for n in range(count)]
-    body = "; ".join(f"{w}(self, {v})" for w, v in zip(writers, values)) or "pass"
-    head = ", ".join(["self", *values])
-    made: dict[str, Any] = {}
-    exec(f"def make({', '.join(writers)}):\n def __init__({head}): {body}\n return __init__", made)
-    return made["make"]  # type: ignore[no-any-return]
 
 
 def _shared(names: tuple[str, ...]) -> dict[str, Any]:
@@ -117,13 +97,6 @@ def _repr(names: tuple[str, ...]) -> Callable[[Any], str]:
         return f"{type(self).__qualname__}({shown})"
 
     return __repr__
-
-
-def _reduce(get: Callable[[Any], Any]) -> Callable[[Any], Any]:
-    def __reduce__(self: Any) -> Any:
-        return type(self), get(self)
-
-    return __reduce__
 
 
 def _refuse(self: Any, name: str, *_: Any) -> None:

@@ -9,10 +9,7 @@ from __future__ import annotations
 import base64
 import os
 import re
-import shutil
-import tempfile
 from collections.abc import Mapping
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -44,6 +41,9 @@ class Presenter:
             self._session.notify("window/showMessage", {"type": INFO, "message": text})
 
     def _open(self, name: str, data: bytes, external: bool) -> None:
+        import tempfile  # with pathlib and shutil a hundredth of what opening a file takes, and seldom needed
+        from pathlib import Path
+
         if self._folder is None:
             self._folder = tempfile.mkdtemp(prefix="potto-")
         path = Path(self._folder, re.sub(r"[^\w.-]+", "_", name))
@@ -57,4 +57,6 @@ class Presenter:
     def close(self) -> None:
         """Remove the files."""
         if self._folder is not None and os.path.isdir(self._folder):
+            import shutil
+
             shutil.rmtree(self._folder, ignore_errors=True)

@@ -23,5 +23,5 @@ def dump_tree(node: Node) -> str:
 
 def _plain(node: Node) -> list[tuple[str, Any]]:
     """The fields that hold words and numbers."""
-    fields = ((name, getattr(node, name)) for name in node.__match_args__)
+    fields = ((name, getattr(node, name)) for name in type(node).__match_args__)
     return [(name, value) for name, value in fields if isinstance(value, (str, int, float, bool))]

@@ -37,9 +37,9 @@ def bare(tree: Any) -> Any:
         return bare(tree.inner)
     if isinstance(tree, tuple):
         return tuple(bare(item) for item in tree)
-    if not hasattr(tree, "__match_args__") or isinstance(tree, type):
+    if not hasattr(type(tree), "__match_args__"):
         return tree
-    return type(tree)(*(bare(getattr(tree, name)) for name in tree.__match_args__))
+    return type(tree)(*(bare(getattr(tree, name)) for name in type(tree).__match_args__))
 
 
 @LAW

@@ -98,7 +98,7 @@ def bare(node: Any) -> Any:
         return tuple(bare(item) for item in node)
     if isinstance(node, Span):
         return None
-    fields = getattr(node, "__match_args__", None)
+    fields = getattr(type(node), "__match_args__", None)
     if fields is None:
         return node
     return (type(node).__name__, *(bare(getattr(node, name)) for name in fields if name not in ("style",)))
