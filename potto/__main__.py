@@ -15,6 +15,22 @@ from potto import __version__
 FINE, FAILED, WRONG_USE, CRASHED, CLOSED_PIPE, INTERRUPTED = 0, 1, 2, 70, 141, 130
 
 
+def _load_msgspec() -> None:
+    """Import msgspec without typing_extensions, which it asks for what `typing` has, and gets on without: that would
+    take 8 of the 50 ms in which an editor is greeted. Other programs' msgspec is left alone. It stands before any
+    command runs: msgspec swallows an interrupt that comes while it is loaded."""
+    if "msgspec" in sys.modules or "typing_extensions" in sys.modules:
+        return
+    sys.modules["typing_extensions"] = None  # type: ignore[assignment]  # what is None here cannot be imported
+    try:
+        import msgspec  # noqa: F401
+    finally:
+        del sys.modules["typing_extensions"]
+
+
+_load_msgspec()
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command line and give its exit status."""
     arguments = list(sys.argv[1:] if argv is None else argv)
@@ -48,7 +64,6 @@ def _leave() -> None:
 def _guarded(arguments: list[str]) -> int:
     import os
 
-    _load_msgspec()
     from potto.cli.command_line import dispatch
 
     try:
@@ -77,18 +92,6 @@ def _guarded(arguments: list[str]) -> int:
         if _of_interrupt(error):
             raise KeyboardInterrupt from error
         return _crashed(arguments, error)
-
-
-def _load_msgspec() -> None:
-    """Import msgspec without typing_extensions, which it asks for what `typing` has, and gets on without: that would
-    take 8 of the 50 ms in which an editor is greeted. Other programs' msgspec is left alone."""
-    if "msgspec" in sys.modules or "typing_extensions" in sys.modules:
-        return
-    sys.modules["typing_extensions"] = None  # type: ignore[assignment]  # what is None here cannot be imported
-    try:
-        import msgspec  # noqa: F401
-    finally:
-        del sys.modules["typing_extensions"]
 
 
 def _of_interrupt(error: BaseException | None) -> bool:

@@ -14,7 +14,7 @@ from potto.modules import chunk_start, module_diagnostics, names, open_files, so
 from potto.modules.graph import dependencies, imported_files
 from potto.modules.lookup import bindings
 from potto.modules.misread import syntax_diagnostics
-from potto.modules.texts import chunk_text, chunks, imports, is_diffeo, parsed
+from potto.modules.texts import chunk_text, chunks, imports, is_diffeo, parsed, pieces
 from potto.projects.project import Project, Projects, read_project
 from potto.query import Database
 from potto.reports.render import Located
@@ -198,9 +198,8 @@ class Analysis:
 
         if key not in self.taken:
             self._ripe.add(key)
-        if self._crew is not None:
-            self._crew.leave(key)
         try:
+            self._share(key)
             return check.diagnostics(self.db, key)
         except Exception:
             from potto.checking.check import arranged
@@ -210,12 +209,29 @@ class Analysis:
     # Helpers
 
     def call_helpers(self) -> None:
-        """Let helper processes check the closed files too, if there are enough files for that to pay."""
+        """Let helper processes check the ends of open files and then the closed ones, if there is enough for that to
+        pay."""
         from potto.crew import Crew, helpers_for
 
-        files = [key for key in self.programs() if key not in self._documents]
-        if self._crew is None and (helpers := helpers_for(files)):
-            self._crew = Crew(self.db, self.files.roots, files, helpers, self._open_texts())
+        files, texts = [key for key in self.programs() if key not in self._documents], self._open_texts()
+        if self._crew is None and (helpers := helpers_for(files, sum(map(len, texts.values())))):
+            ends = [(key, text) for key in texts for text in pieces(self.db, key)]
+            self._crew = Crew(self.db, self.files.roots, files, helpers, texts, ends)
+
+    def _share(self, key: str) -> None:
+        """Check a file together with the helpers: if it is open, piece by piece, from its start here and from its end
+        there."""
+        from potto.checking.check import check_ahead
+
+        crew = self._crew
+        if crew is None:
+            return
+        crew.leave(key)
+        for text in pieces(self.db, key) if key in self._documents and not self.settled else ():
+            crew.leave(key, text)
+            while crew.has_found:
+                self.take_over()
+            check_ahead(self.db, key, text)
 
     def _tell_crew(self) -> None:
         if self._crew is not None:

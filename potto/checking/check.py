@@ -12,8 +12,8 @@ from potto.calculus.checking.diffeo import check_conditions
 from potto.diagnostics import Diagnostic, Related
 from potto.modules import chunk_start, module_diagnostics, statements
 from potto.modules.graph import Run, name_runs
-from potto.modules.misread import moved, syntax_diagnostics
-from potto.modules.texts import StatementRef
+from potto.modules.misread import moved, piece_diagnostics, syntax_diagnostics
+from potto.modules.texts import StatementRef, is_diffeo, piece
 from potto.query import Database, query
 from potto.quick import replace
 from potto.reports.render import Located
@@ -61,6 +61,18 @@ def definition_diagnostics(db: Database, file: str, name: str) -> tuple[Diagnost
     if has_errors(found) or interface(db, file, name).broken:
         return found
     return (*found, *check_conditions(db, file, name))
+
+
+@query(keep=512, travels=True)
+def check_ahead(db: Database, file: str, text: str) -> tuple[str, ...]:
+    """Check a piece of a file before the file is asked for: what the parser says of it, and the definitions in it. The
+    names of those."""
+    diffeo = is_diffeo(file)
+    piece_diagnostics(db, text, diffeo)
+    found = tuple(piece(db, text, diffeo).texts)
+    for name in found:
+        definition_diagnostics(db, file, name)
+    return found
 
 
 def statement_diagnostics(db: Database, file: str, reference: StatementRef) -> list[Diagnostic]:

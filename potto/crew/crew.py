@@ -4,37 +4,37 @@ from __future__ import annotations
 
 import logging
 import os
-import subprocess
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
-from pathlib import Path
 from queue import Empty, SimpleQueue
 from threading import Lock, Thread
 from types import TracebackType
 
-from potto.crew.pipes import CheckedFile, CheckTask, packed, unpacked
+from potto.crew.helper import serve
+from potto.crew.pipes import Checked, CheckTask, Part, packed, unpacked
+from potto.crew.processes import begun, can_be_copied
 from potto.query import Database
 from potto.query.travel import Receiver
 
 logger = logging.getLogger(__name__)
 ENOUGH = 200_000  # bytes of programs for each helper: about twice what is checked in the time that it takes to start
+ENOUGH_FOR_COPIES = 30_000  # of which a tenth is checked in that time
 MOST = 8
-# Not `-m`, which looks for every module in the working folder first.
-PROGRAM = "import sys; sys.path.append(sys.argv[1]); from potto.crew.helper import main; main()"
-AHEAD = 4  # files that a helper is given before it has told about the first
+AHEAD = 4  # parts that a helper is given before it has told about the first
 
 
-def helpers_for(files: Iterable[str], processors: int | None = None) -> int:
-    """How many helpers are worth their start for so many files: one processor is left to who asks for them."""
-    sizes = 0
+def helpers_for(files: Iterable[str], opened: int = 0, processors: int | None = None) -> int:
+    """How many helpers are worth their start for so many files, and bytes of open ones: one processor is left to who
+    asks for them."""
+    sizes = opened
     for file in files:
         try:
             sizes += os.stat(file).st_size
         except (OSError, ValueError):
             continue
     free = (usable_processors() if processors is None else processors) - 1
-    return max(0, min(free, MOST, sizes // ENOUGH))
+    return max(0, min(free, MOST, sizes // (ENOUGH_FOR_COPIES if can_be_copied() else ENOUGH)))
 
 
 def usable_processors() -> int:
@@ -45,7 +45,8 @@ def usable_processors() -> int:
 
 
 class Crew:
-    """Helpers that check files from the last one on. All but what the listeners do is for one thread at a time."""
+    """Helpers that check files, and pieces of them, from the last one on. All but what the listeners do is for one
+    thread at a time."""
 
     def __init__(
         self,
@@ -54,12 +55,15 @@ class Crew:
         files: Iterable[str],
         helpers: int,
         texts: Mapping[str, str] | None = None,
+        pieces: Iterable[tuple[str, str]] = (),
     ) -> None:
+        """pieces: of files, to be checked before all others, from the last one on."""
         self._db, self._roots = db, tuple(roots)
-        self._left = dict.fromkeys(files)  # what nobody has begun
+        whole: list[Part] = [(file, None) for file in files]
+        self._left = dict.fromkeys([*whole, *pieces])  # what nobody has begun
         self._lock = Lock()
-        self._found: SimpleQueue[tuple[_Helper, CheckedFile]] = SimpleQueue()
-        self._taking: tuple[_Helper, CheckedFile] | None = None
+        self._found: SimpleQueue[tuple[_Helper, Checked]] = SimpleQueue()
+        self._taking: tuple[_Helper, Checked] | None = None
         self._receivers: dict[tuple[_Helper, int], Receiver] = {}
         self._helpers: list[_Helper] = []
         self.texts = texts or {}  # of open files, to be replaced when they change
@@ -90,8 +94,8 @@ class Crew:
         return self._taking is not None or not self._found.empty()
 
     def take(self) -> str | None:
-        """Take over what was found out about one file, and say which; None if there is nothing now, or nothing that
-        holds. If that is cancelled, the next call goes on with it."""
+        """Take over what was found out about one file or piece, and say of which file all is known; None if there is
+        nothing now, nothing that holds, or it was a piece. If that is cancelled, the next call goes on with it."""
         if self._taking is None:
             try:
                 self._taking = self._found.get_nowait()
@@ -100,7 +104,8 @@ class Crew:
         helper, found = self._taking
         holds = found.parcel is not None and self._receiver(helper, found.round).take(found.parcel)
         self._taking = None
-        return found.file if holds else None
+        file, piece = found.part
+        return file if holds and piece is None else None
 
     def _receiver(self, helper: _Helper, round: int) -> Receiver:
         key = helper, round
@@ -108,10 +113,10 @@ class Crew:
             self._receivers[key] = Receiver(self._db)
         return self._receivers[key]
 
-    def leave(self, file: str) -> None:
-        """A file that is checked here needs no helper."""
+    def leave(self, file: str, piece: str | None = None) -> None:
+        """A file, or a piece of it, that is checked here needs no helper."""
         with self._lock:
-            self._left.pop(file, None)
+            self._left.pop((file, piece), None)
 
     def close(self) -> None:
         """End all helpers."""
@@ -132,7 +137,7 @@ class Crew:
         Thread(target=self._listen, args=(helper,), name="potto-crew", daemon=True).start()
 
     def _listen(self, helper: _Helper) -> None:
-        """Give a helper files and hear what it says, on a thread of its own."""
+        """Give a helper parts and hear what it says, on a thread of its own."""
         self._give(helper, AHEAD)
         helper.expected -= 1
         try:
@@ -148,31 +153,27 @@ class Crew:
 
     def _give(self, helper: _Helper, count: int) -> None:
         with self._lock:
-            files = tuple(self._left.popitem()[0] for _ in range(min(count, len(self._left))))
-        if files:
-            helper.put(files, self._roots, self.texts)
+            parts = tuple(self._left.popitem()[0] for _ in range(min(count, len(self._left))))
+        if parts:
+            helper.put(parts, self._roots, self.texts)
 
 
 class _Helper:
     """One process and the texts that it has."""
 
     def __init__(self) -> None:
-        pipe = subprocess.PIPE
-        command = [sys.executable, "-P", "-c", PROGRAM, str(Path(__file__).parents[2])]
-        self.process = subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=subprocess.DEVNULL)
-        assert self.process.stdin is not None and self.process.stdout is not None
-        self._tasks, self.answers = self.process.stdin, self.process.stdout
+        self.process, self._tasks, self.answers = begun(serve)
         self._texts: Mapping[str, str] = {}
-        self.expected = 1  # answers; one more until it has been given files
+        self.expected = 1  # answers; one more until it has been given parts
 
-    def put(self, files: tuple[str, ...], roots: tuple[str, ...], texts: Mapping[str, str]) -> None:
-        """Give it files, and the texts that are not as it has them. One that is dead does not hear it."""
+    def put(self, parts: tuple[Part, ...], roots: tuple[str, ...], texts: Mapping[str, str]) -> None:
+        """Give it parts, and the texts that are not as it has them. One that is dead does not hear it."""
         changed = [(key, text) for key, text in texts.items() if self._texts.get(key) != text]
         closed = [(key, None) for key in self._texts if key not in texts]
         self._texts = texts
-        self.expected += len(files)
+        self.expected += len(parts)
         try:
-            self._tasks.write(packed(CheckTask(files, roots, (*changed, *closed))))
+            self._tasks.write(packed(CheckTask(parts, roots, (*changed, *closed))))
             self._tasks.flush()
         except (OSError, ValueError):
             logger.info("a helper process has ended")

@@ -9,23 +9,25 @@ from queue import SimpleQueue
 from threading import Thread
 from typing import BinaryIO
 
-from potto.checking.check import diagnostics
-from potto.crew.pipes import CheckedFile, CheckTask, packed, unpacked
+from potto.checking.check import check_ahead, diagnostics
+from potto.crew.pipes import Checked, CheckTask, Part, packed, unpacked
 from potto.modules import open_files
 from potto.query import Database
 from potto.query.travel import Sender
 
 
 def serve(reader: BinaryIO, writer: BinaryIO) -> None:
-    """Check the files of each task and tell about one after the other."""
+    """Check the parts of each task and tell about one after the other."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # a terminal sends it to everybody; the input ends all the same
+    gc.disable()  # it lives for seconds, and nearly all that it makes stays
     tasks: SimpleQueue[CheckTask] = SimpleQueue()
     Thread(target=_read, args=(reader, tasks), name="potto-tasks", daemon=True).start()
     helper = Helper()
     while True:
         task = tasks.get()
         helper.prepare(task)
-        for file in task.files:
-            writer.write(helper.checked(file))
+        for part in task.parts:
+            writer.write(helper.checked(part))
             writer.flush()
 
 
@@ -59,19 +61,20 @@ class Helper:
     def _begin_anew(self) -> None:
         self._sender, self._round = Sender(self._db), self._round + 1
 
-    def checked(self, file: str) -> bytes:
-        """What there is to say about a file, as a message."""
+    def checked(self, part: Part) -> bytes:
+        """What there is to say about a file, or a piece of it, as a message."""
+        file, piece = part
         try:
-            return packed(CheckedFile(file, self._round, self._sender.pack(diagnostics, file)))
-        except Exception:  # whoever asked checks the file and meets it there
+            sent = self._sender
+            parcel = sent.pack(diagnostics, file) if piece is None else sent.pack(check_ahead, file, piece)
+            return packed(Checked(part, self._round, parcel))
+        except Exception:  # whoever asked checks it and meets it there
             self._begin_anew()
-            return packed(CheckedFile(file, self._round, None))
+            return packed(Checked(part, self._round, None))
 
 
 def main() -> None:
     """Serve the process that has started this one, over standard input and output."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # a terminal sends it to everybody; the input ends all the same
-    gc.disable()  # it lives for seconds, and nearly all that it makes stays
     reader, writer = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # what anything prints must not get between the messages
     try:

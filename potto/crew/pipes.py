@@ -12,23 +12,26 @@ from potto.query.travel import Parcel
 LENGTH = 4  # bytes
 
 
-class CheckTask(Struct, frozen=True):
-    """Files to check, and what has changed since the last task: roots, and texts of open files (None: closed)."""
+Part = tuple[str, str | None]  # a file, and the text of a piece of it or None: all of it
 
-    files: tuple[str, ...]
+
+class CheckTask(Struct, frozen=True):
+    """What to check, and what has changed since the last task: roots, and texts of open files (None: closed)."""
+
+    parts: tuple[Part, ...]
     roots: tuple[str, ...]
     texts: tuple[tuple[str, str | None], ...]
 
 
-class CheckedFile(Struct, frozen=True):
-    """What was found out about a file; no parcel if that failed. `round`: after an edit both ends begin anew."""
+class Checked(Struct, frozen=True):
+    """What was found out; no parcel if that failed. `round`: after an edit both ends begin anew."""
 
-    file: str
+    part: Part
     round: int
     parcel: Parcel | None
 
 
-def packed(message: CheckTask | CheckedFile) -> bytes:
+def packed(message: CheckTask | Checked) -> bytes:
     """A message as bytes. Raises what pickling raises, for what is nested too deeply."""
     body = pickle.dumps(message, pickle.HIGHEST_PROTOCOL)
     return len(body).to_bytes(LENGTH, "little") + body

@@ -1,6 +1,6 @@
 """What the parser has to say about a file, read in pieces, and diagnostics of a text that stands further on in a file.
 
-Owns `syntax_diagnostics`, `moved` and `shift`. What is said of a piece is kept relative to it, so that an edit above it
+Owns `syntax_diagnostics`, `piece_diagnostics`, `moved` and `shift`. What is said of a piece is kept relative to it, so that an edit above it
 says nothing anew.
 """
 
@@ -27,13 +27,13 @@ def _group_diagnostics(db: Database, group: tuple[str, ...], diffeo: bool) -> tu
     """What it has to say about a group of pieces, relative to the first one."""
     start, found = 0, list[Diagnostic]()
     for text in group:
-        found += [shift(diagnostic, start, None) for diagnostic in _piece_diagnostics(db, text, diffeo)]
+        found += [shift(diagnostic, start, None) for diagnostic in piece_diagnostics(db, text, diffeo)]
         start += len(text)
     return tuple(found)
 
 
-@query(keep=512)
-def _piece_diagnostics(db: Database, text: str, diffeo: bool) -> tuple[Diagnostic, ...]:
+@query(keep=512, travels=True)
+def piece_diagnostics(db: Database, text: str, diffeo: bool) -> tuple[Diagnostic, ...]:
     """What it has to say about a piece, relative to it."""
     return tuple(
         [

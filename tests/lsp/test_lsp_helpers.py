@@ -25,7 +25,8 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     for number in range(COUNT):
         first = f"from m{number - 1} import f, g as h\n" if number else "import nothing\n"
         (tmp_path / f"m{number}.po").write_text(f"{first}\ndef f(t)\n    t + {number}\n\ndef g(t)\n    f(t)*unknown\n")
-    monkeypatch.setattr(crew, "ENOUGH", 1)
+    for enough in ("ENOUGH", "ENOUGH_FOR_COPIES"):
+        monkeypatch.setattr(crew, enough, 1)
     monkeypatch.setattr(crew, "usable_processors", lambda: 3)
     return tmp_path
 
@@ -56,6 +57,22 @@ def test_what_is_said_is_the_same_with_helpers(folder: Path) -> None:
     helped.forget_trees()
     for key in helped.programs():
         assert helped.diagnostics(key) == alone.diagnostics(key)
+
+
+def test_the_end_of_a_long_open_file_is_checked_by_helpers(folder: Path) -> None:
+    key, text = str(folder / "m5.po"), "".join(f"def f{n}(t)\n    t + unknown*{n}\n\n" for n in range(1000))
+    helped, alone = session(folder), session(folder)
+    for analysis in (helped, alone):
+        analysis.put(Document(to_uri(key), "potto", 2, DocumentText(text, "utf-16")))
+    helped.call_helpers()
+    while not helped.helpers_have_found:
+        time.sleep(0.001)
+    with helped.db.recording() as events:
+        assert helped.diagnostics(key) == alone.diagnostics(key)
+    here = [event.args[1] for event in events if event.query == "definition_diagnostics" and event.kind == "executed"]
+    assert "f0" in here and "f999" not in here
+    helped.dismiss_helpers()
+    assert len(alone.diagnostics(key)) == 1000 and key not in helped.taken
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")
