@@ -1,7 +1,7 @@
 """What the parser has to say about a file, read in pieces, and diagnostics of a text that stands further on in a file.
 
-Owns `syntax_diagnostics`, `piece_diagnostics`, `moved` and `shift`. What is said of a piece is kept relative to it, so that an edit above it
-says nothing anew.
+Owns `syntax_diagnostics`, `piece_diagnostics`, `moved` and `shift`. What is said of a piece is kept relative to it, so
+that an edit above it says nothing anew.
 """
 
 from __future__ import annotations
