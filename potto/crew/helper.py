@@ -12,8 +12,10 @@ from typing import BinaryIO
 from potto.checking.check import check_ahead, diagnostics
 from potto.crew.pipes import Checked, CheckTask, Part, packed, unpacked
 from potto.modules import open_files
+from potto.modules.misread import piece_diagnostics
+from potto.modules.texts import is_diffeo
 from potto.query import Database
-from potto.query.travel import Sender
+from potto.query.travel import Asked, Sender
 
 
 def serve(reader: BinaryIO, writer: BinaryIO) -> None:
@@ -65,12 +67,17 @@ class Helper:
         """What there is to say about a file, or a piece of it, as a message."""
         file, piece = part
         try:
-            sent = self._sender
-            parcel = sent.pack(diagnostics, file) if piece is None else sent.pack(check_ahead, file, piece)
-            return packed(Checked(part, self._round, parcel))
+            return packed(Checked(part, self._round, self._sender.pack_all(_asked(file, piece))))
         except Exception:  # whoever asked checks it and meets it there
             self._begin_anew()
             return packed(Checked(part, self._round, None))
+
+
+def _asked(file: str, piece: str | None) -> list[Asked]:
+    """What is asked about a file or a piece of it. What the parser says rests on the piece's text alone."""
+    if piece is None:
+        return [(diagnostics, (file,))]
+    return [(piece_diagnostics, (piece, is_diffeo(file))), (check_ahead, (file, piece))]
 
 
 def main() -> None:

@@ -11,7 +11,7 @@ here, so nothing is ever taken over that would not have been found here.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Sequence
 from hashlib import blake2b
 from importlib import import_module
 from typing import Any
@@ -21,6 +21,7 @@ from potto.query.nodes import Input, MappingEntry, Memo, Node, Query, entry_of
 from potto.quick import quick, value
 
 Args = tuple[Hashable, ...]
+Asked = tuple[Callable[..., Any], Args]  # a query and what it is asked about
 # Everything is called by its number in the order of sending. What was read: an input and the digest of its value; an
 # answer: its query, arguments and value by number, and what it has read; or a key of an answer that is a table.
 InputSent = tuple[Hashable, str]
@@ -63,11 +64,17 @@ class Sender:
 
     def pack(self, query: Callable[..., Any], *args: Hashable) -> Parcel:
         """The parcel for an answer. The query must travel. Raises whatever the query raises."""
+        return self.pack_all([(query, args)])
+
+    def pack_all(self, asked: Sequence[Asked]) -> Parcel:
+        """The parcel for some answers, whose root is the last one. One that rests on no input is named by itself: what
+        has read it does not lead to it."""
         with self._db.evaluating():
-            root = self._db.memo(query, args)
+            roots = [self._db.memo(query, args) for query, args in asked]
             self._new_values, self._new = [], []
-            self._look_at(root)
-            return Parcel(self._views[root][0], tuple(self._new_values), tuple(self._new))
+            for root in roots:
+                self._look_at(root)
+            return Parcel(self._views[roots[-1]][0], tuple(self._new_values), tuple(self._new))
 
     def _look_at(self, root: Memo) -> None:
         """Visit everything that a memo depends on, from the bottom up, without recursion."""

@@ -190,7 +190,10 @@ def test_pieces_of_a_file_are_checked_before_whole_files_from_its_end(tmp_path: 
     with library.db.recording() as events:
         assert library.diagnostics(large) == alone.diagnostics(large) != ()
     here = [event.args[1] for event in events if event.query == "definition_diagnostics" and event.kind == "executed"]
-    assert here and not any(f"def {name}(" in "".join(parts[3:]) for name in here)
+    last = "".join(parts[3:])
+    assert here and not any(f"def {name}(" in last for name in here)
+    read = [event.args[0] for event in events if event.query == "parsed" and event.kind == "executed"]
+    assert read and not any(text in last for text in read)
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="/proc")
