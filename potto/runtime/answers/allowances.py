@@ -43,6 +43,8 @@ class Allowance(Struct, frozen=True):
 
     def and_of(self, other: Allowance) -> Allowance:
         """That of what is made of the integrals of both; of batches that do not go together the least."""
+        if self is NOTHING:
+            return other
         if isinstance(self.most, float) and isinstance(other.most, float):
             return Allowance(max(self.most, other.most), self.kept and other.kept, self.finite and other.finite)
         try:
@@ -59,6 +61,12 @@ class Allowance(Struct, frozen=True):
             return Allowance(*(np.broadcast_to(part, shape) for part in (self.most, *self.holds)))
         except ValueError:
             return Allowance(float(np.min(self.most, initial=np.inf)), *(bool(np.all(part)) for part in self.holds))
+
+    def of(self, members: Bools) -> Allowance:
+        """That of some members of its batch, a mask."""
+        if not np.ndim(self.most):
+            return self
+        return Allowance(*(part[members] for part in (self.most, *self.holds)))
 
     def added(self, shape: tuple[int, ...], count: int, those: Bools | None = None) -> Allowance:
         """That of sums of so many summands, the last axis, over a batch of this shape: at least as much is added up as

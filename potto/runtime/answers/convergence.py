@@ -102,9 +102,9 @@ def missed(value: Any, error: Any, allowed: Allowance, settings: Settings, drawn
         bad |= ~(limit < np.inf)
     if not bad.any():
         return {}
-    within = np.broadcast_to(allowed.over(v.shape).error(settings.rtol), v.shape)
     size, off = v[bad], e[bad]  # few of a large batch
-    wrong = ~((off <= settings.atol) | (off <= rtol * size) | (off <= within[bad])) | np.isnan(size)
+    within = allowed.over(v.shape).of(bad).error(settings.rtol)
+    wrong = ~((off <= settings.atol) | (off <= rtol * size) | (off <= within)) | np.isnan(size)
     bad[bad] = np.where(np.isinf(size), ~np.isfinite(off), wrong)  # an infinity may be known to be one
     if not bad.any():
         return {}
