@@ -47,3 +47,26 @@ def test_errors_cover(rows: list[tuple[float, float, float, float]]) -> None:
         alone = M.four(a, b, c, d)
         for value, error in ((alone.value, alone.error), (batch.value[i], batch.error[i])):
             assert abs(Fraction(float(value)) - exact) <= Fraction(float(error)) * (1 + Fraction(1, 2**40))
+
+
+SUMS = potto.compile("""
+def range(n, t) sum i in 0..n-1 (0.1*t)
+def elements(xs: [n] Real, t) sum x in xs (x*t)
+""")
+
+
+@pytest.mark.parametrize("n", [10, 1000, 30_000, 600_000])
+@pytest.mark.parametrize("t", [0.7, np.array([0.7, 0.2])], ids=["a number", "a batch"])
+def test_sums_cover_what_they_round_off(n: int, t: object) -> None:
+    """Equal summands: rounding goes the same way at each. The last sums come in chunks."""
+    for answer in (potto.grad(SUMS.range, "t")(n, t), potto.grad(SUMS.elements, "t")(np.full(n, 0.1), t)):
+        slope = n * Fraction(0.1)
+        for value, error, at in zip(*map(np.ravel, (answer.value, answer.error, t)), strict=True):
+            assert abs(Fraction(float(value)) - slope * Fraction(float(at))) <= Fraction(float(error)) < 1e-14 * slope
+        for tangent, error in zip(*map(np.ravel, (answer.tangent, answer.tangent_error)), strict=True):
+            assert abs(Fraction(float(tangent)) - slope) <= Fraction(float(error)) < 1e-14 * slope
+
+
+def test_slopes_that_are_whole_numbers_are_exact() -> None:
+    answer = potto.grad(potto.compile("def f(t) sum i in 1..100 (i*t)").f)(0.25)
+    assert answer.tangent == 5050 and answer.tangent_error == 0.0

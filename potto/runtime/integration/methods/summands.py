@@ -21,16 +21,15 @@ from potto.integrate.columns import distinct
 from potto.kernels import errors
 from potto.kernels.cells import Array, Bools, Cell, Number, Value, all_arrays, combined, map_arrays, pad
 from potto.kernels.tape import Node
-from potto.kernels.whole import ROUNDING, UNIT_ROUNDOFF
+from potto.kernels.whole import ROUNDING
 from potto.runtime.answers.allowances import NOTHING
 from potto.runtime.evaluation.functions import Closure, Derivative
 from potto.runtime.evaluation.machine import Machine
-from potto.runtime.evaluation.sums import CHUNK
+from potto.runtime.evaluation.sums import CHUNK, PAIRWISE
 from potto.runtime.integration.problem import linked
 
 Slots = tuple[int, ...]  # the directions in which a member moves
 SAMPLED = ("mc", "qmc")  # methods whose errors are no less for one summand than for many
-SUM = 8 * UNIT_ROUNDOFF  # what numpy's pairwise sums round off, as a part of all magnitudes, as in `sums`
 MOST_KNOWN = 256  # sums of which it is kept what is alike in them
 
 FUNCTION = "function"
@@ -251,12 +250,13 @@ class _Parts:
         into = self.into[:, keep].reshape(-1)
         order = np.argsort(into, kind="stable")
         ends = np.searchsorted(into[order], np.arange(self.directions + 2))
-        numbers, off = (x[..., keep].reshape(*self.batch, -1)[..., order] for x in (self.numbers, self.off))
+        # `take` leaves the numbers of a sum side by side in memory, so that numpy adds them up in pairs
+        numbers, off = (x[..., keep].reshape(*self.batch, -1).take(order, -1) for x in (self.numbers, self.off))
         found: list[tuple[Number | None, Number | None]] = [(None, None)] * (self.directions + 1)
         for place in distinct(into[into <= self.directions]).tolist():
             here = slice(ends[place], ends[place + 1])
             size = np.abs(numbers[..., here])
-            sums = numbers[..., here].sum(axis=-1), (off[..., here] + SUM * size).sum(axis=-1)
+            sums = numbers[..., here].sum(axis=-1), (off[..., here] + PAIRWISE * size).sum(axis=-1)
             found[place] = sums if self.batch else (float(sums[0]), float(sums[1]))
         (v, e), *tangents = found
         assert v is not None

@@ -5,7 +5,6 @@ Owns `culled`. What is left is one batch of pairs, a member and a summand each; 
 
 from __future__ import annotations
 
-import operator
 from typing import Any
 
 import numpy as np
@@ -18,21 +17,20 @@ from potto.core.terms import Index, Integral, Prim, Sum, Term, Var, function_of,
 from potto.diagnostics import PottoError
 from potto.integrate.decomposition.culling import Pairs, culls, remaining
 from potto.integrate.pieces import still
-from potto.kernels.cells import Array, Cell, Env, Ints, Rows, Value, all_arrays, combined, map_arrays, map_cells
+from potto.kernels.cells import Array, Cell, Env, Ints, Rows, Value, all_arrays, map_arrays, map_cells
 from potto.kernels.making import making
 from potto.kernels.tape import Edge, Node
-from potto.kernels.whole import UNIT_ROUNDOFF
 from potto.runtime.answers.allowances import NOTHING
 from potto.runtime.answers.convergence import merged
 from potto.runtime.evaluation.functions import Closure
 from potto.runtime.evaluation.machine import Machine
 from potto.runtime.evaluation.reach import Reach, kept
+from potto.runtime.evaluation.sums import PAIRWISE, plus
 from potto.runtime.integration.preparation.arrays import holds, in_names
 from potto.runtime.integration.preparation.prepared import filled
 
 FEW = 512  # pairs, up to which all are evaluated
 PAIRS = 1 << 17  # evaluated together
-SUM = 8 * UNIT_ROUNDOFF
 
 
 def culled(machine: Machine, term: Sum, first: int, last: int, env: Env) -> Value | None:
@@ -153,7 +151,7 @@ def _added(machine: Machine, term: Sum, pairs: Pairs, first: int, env: Env, shap
         here[term.variable] = Cell(first + those.astype(float), None, (None,) * machine.directions)
         value = _evaluated(machine, term, here, (at, those), size, shape)
         part = map_cells(value, lambda cell, at=at: _summed(cell, at, size, shape))  # type: ignore[misc]
-        whole = part if whole is None else _plus(whole, part)
+        whole = part if whole is None else plus(whole, part)
     return whole
 
 
@@ -186,16 +184,25 @@ def _evaluated(
 
 
 def _summed(cell: Cell, at: Ints, size: int, shape: tuple[int, ...]) -> Cell:
+    """The answers for pairs, of which those of a member stand together, added up by members."""
+    starts = np.flatnonzero(np.diff(at, prepend=-1))
+
     def total(part: Any) -> Any:
         if part is None:
             return None
         if isinstance(part, Node):
             return _total(part, at, shape)
-        found = np.bincount(at, np.broadcast_to(part, at.shape), size)
+        found = np.zeros(size)
+        found[at[starts]] = np.add.reduceat(np.broadcast_to(part, at.shape), starts)  # pairwise, as `bincount` is not
         return found.reshape(shape) if shape else float(found[0])
 
-    off = SUM * np.abs(cell.v) + (0.0 if cell.e is None else cell.e)
-    return Cell(total(cell.v), total(off), tuple(map(total, cell.t)), tuple(map(total, cell.et)))
+    def lost(part: Any, off: Any) -> Any:
+        if part is None or isinstance(part, Node):
+            return total(off)
+        return total(PAIRWISE * np.abs(part) + (0.0 if off is None else off))
+
+    t, et = tuple(map(total, cell.t)), tuple(map(lost, cell.t, cell.et))
+    return Cell(total(cell.v), lost(cell.v, cell.e), t, et)
 
 
 def _total(node: Node, at: Ints, shape: tuple[int, ...]) -> Node:
@@ -206,7 +213,3 @@ def _total(node: Node, at: Ints, shape: tuple[int, ...]) -> Node:
         return np.broadcast_to(adjoint, shape).reshape(-1)[at] if shape else np.broadcast_to(adjoint, at.shape)
 
     return Node((Edge(node, pull=pull),), shape)
-
-
-def _plus(a: Value, b: Value) -> Value:
-    return combined(operator.add, a, b)
