@@ -251,6 +251,22 @@ def test_places_that_do_not_rise_are_told(programs: potto.Module, xs: list[float
         assert f"{second} follows {first}" in told.value.diagnostics[0].message
 
 
+@pytest.mark.parametrize("at", [0.25, 2.0])
+def test_a_table_of_one_place_is_constant(programs: potto.Module, at: float) -> None:
+    """As beyond the ends of a longer one, whether the place is within the range or beyond it: y^2*(b - a) with slope
+    2*y*(b - a), and where y > t the integral of x, with no slope but by the bounds."""
+    y, a, b = 0.5, 0.2, 0.7
+    found = potto.grad(programs.table, wrt=("ys", "xs", "b"))([at], [y], a, b)
+    assert float(found.value) == pytest.approx(y**2 * (b - a), rel=1e-14)
+    by_value, by_place, by_bound = found.tangent
+    assert (by_value[0], by_place[0], by_bound) == pytest.approx((2 * y * (b - a), 0, y**2), rel=1e-14)
+    for t, holds in ((0.4, 1), (0.6, 0)):
+        above = potto.grad(programs.higher, wrt=("ys", "b"))([at], [y], a, b, t)
+        assert float(above.value) == pytest.approx(holds * (b**2 - a**2) / 2, rel=1e-14)
+        assert (above.tangent[0][0], above.tangent[1]) == pytest.approx((0, holds * b), abs=1e-14)
+    assert potto.compile("def at(xs: [n] Real, ys: [n] Real, x) interp(xs, ys, x)").at([at], [y], 0.3).value == y
+
+
 def test_places_made_in_the_program() -> None:
     program = potto.compile("""
 def squares(x) interp([0.1*i for i in 0..10], [i^2 for i in 0..10], x)

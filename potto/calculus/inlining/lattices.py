@@ -230,8 +230,13 @@ def _table(node: Sum) -> Lattice | None:
             return None
         rise, slope = (_at(other, part) for part in parts)
         inner = apply("clamp", cell, ZERO, last)
-        done = div(sub(place, end(1, inner)), sub(end(2, inner), end(1, inner)))
-        walked = mul(_inside_of(cell, ZERO, behind), add(mul(rise(inner), done), slope(inner)))
+
+        def read(found: Term, otherwise: Term = ZERO) -> Term:
+            """What is read of a cell; of one place there is none."""
+            return if_(prim("lt", last, ZERO), otherwise, found)
+
+        done = div(sub(place, read(end(1, inner))), read(sub(end(2, inner), end(1, inner)), ONE))
+        walked = mul(_inside_of(cell, ZERO, behind), add(mul(read(rise(inner)), done), read(slope(inner))))
         return add(_behind(rise, cell, behind), walked)
 
     return way.args[0], cells, border, behind, look
