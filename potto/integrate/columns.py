@@ -44,13 +44,17 @@ class Columns(Struct):
 
     def put(self, index: Any, part: Self) -> None:
         """Replace some members of the batch; of what is not known of the part, nothing is known of the whole."""
-        there, where = part.arrays(), run_of(index)
-        where = index if where is None else where
+        there, span = part.arrays(), run_of(index)
+        where: Any = index if span is None else span
         for name, x in self.arrays().items():
-            if name in there:
-                x[..., where] = there[name]
-            else:
+            if name not in there:
                 setattr(self, name, None)
+            elif where.__class__ is slice or where.size <= FEW:
+                x[..., where] = there[name]
+            else:  # row by row, which of many members takes a fifth of the time
+                own = np.broadcast_to(there[name], (*x.shape[:-1], where.size))
+                for row in np.ndindex(x.shape[:-1]):
+                    x[row][where] = own[row]
 
 
 def run_of(index: Any) -> slice | None:

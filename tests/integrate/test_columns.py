@@ -28,6 +28,19 @@ def test_members_are_those_that_were_asked_for(index: list[int]) -> None:
     assert whole.v[0].tolist() == expected.tolist()
 
 
+def test_many_members_are_put_in_each_row() -> None:
+    random = np.random.default_rng(0)
+    whole, part = Sums.zeros(2, 3, 500), Sums.zeros(2, 3, 200)
+    places = random.permutation(500)[:200]
+    for x in part.arrays().values():
+        x[...] = random.random(x.shape)
+    whole.put(places, part)
+    for name, x in whole.arrays().items():
+        for number, place in enumerate(places):
+            assert (x[..., place] == part.arrays()[name][..., number]).all()
+        assert not np.delete(x, places, axis=-1).any()
+
+
 def test_only_what_is_in_order_is_a_run() -> None:
     assert run_of(np.array([2, 3, 4])) == slice(2, 5)
     assert run_of(np.array([2, 4, 3, 5])) is None

@@ -26,7 +26,7 @@ from potto.integrate.fixed.straight import MOST_TERMS, StraightIntegral
 from potto.integrate.pieces import Evaluator, gather
 from potto.integrate.rules.intervals import Interval
 from potto.integrate.rules.lowered_intervals import enclosures
-from potto.kernels.cells import Array, Bools, Cell, Ints, Value, map_arrays, map_cells
+from potto.kernels.cells import Array, Bools, Cell, Ints, Value, map_cells
 
 MOST_VARIABLES = 3
 # Members that are enclosed together; and that are done at once, whose numbers stay in the cache.
@@ -180,7 +180,7 @@ def _codes(box: Box, machine: Evaluator, env: Mapping[str, Value], low: Array, h
     codes = np.zeros(plain.size, dtype=np.int64)
     if box.surfaces:
         todo = _by_runs(box, machine, env, low, high, codes)
-        some = low[:, todo], high[:, todo]
+        some = low.take(todo, 1), high.take(todo, 1)
         codes[todo] = _one_by_one(box, machine, gather({name: env[name] for name in box.asked}, todo), *some)
     codes[~plain] = UNCLEAR
     return codes
@@ -236,8 +236,8 @@ def _one_by_one(box: Box, machine: Evaluator, env: dict[str, Value], low: Array,
     index: Ints = np.nonzero(codes != UNCLEAR)[0]
     curved = box.surfaces[box.flat :]
     if curved and index.size:
-        here = {name: map_arrays(env[name], lambda a: a[index]) for name in box.depends_curved}
-        ranges = _ranges(box, here, here, low[:, index], high[:, index])
+        here = gather({name: env[name] for name in box.depends_curved}, index)
+        ranges = _ranges(box, here, here, low.take(index, 1), high.take(index, 1))
         for number, (least, most) in enumerate(enclosures(curved, ranges, index.size, machine.backend), box.flat):
             codes[index[~((least > 0) | (most < 0))]] = UNCLEAR
             if number in box.places:

@@ -55,7 +55,10 @@ class Bounds(Struct, frozen=True):
 
     def of(self, where: Ints | slice) -> Bounds:
         """Those of some of the boxes."""
-        return Bounds(self.low[:, where], self.high[:, where], None if self.off is None else self.off[:, where])
+        if isinstance(where, slice):
+            return Bounds(self.low[:, where], self.high[:, where], None if self.off is None else self.off[:, where])
+        return Bounds(self.low.take(where, 1), self.high.take(where, 1),
+                      None if self.off is None else self.off.take(where, 1))  # fmt: skip
 
 
 class Means(Struct, frozen=True):

@@ -54,10 +54,11 @@ def _by_faces(
     for code in distinct(sides.codes).tolist():
         if code == UNCLEAR:
             continue
-        face, index = box.face(code), np.nonzero(sides.codes == code)[0]
+        face, there = box.face(code), sides.codes == code
         if nothing(face.term):
-            done[index] = True
+            done |= there
             continue
+        index = np.flatnonzero(there)
         for where, found in _of_face(box, face, sides, machine, env, index, able):
             if sums is None:
                 sums = Sums.zeros(found.v.shape[0], machine.directions, batch)

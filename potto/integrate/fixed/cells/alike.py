@@ -93,8 +93,9 @@ def _of_one_form(
     error = np.add(truncated, rounding, out=truncated)
     added = np.stack((gross[0], gross[1:].max(axis=0, initial=0.0)))
     if not done.all():
+        left = np.flatnonzero(~done)
         for part in (number, error, added):
-            part[:, ~done] = 0.0
+            part[:, left] = 0.0
     return done, Sums(number[None, 0], error[None, 0], number[None, 1:], error[None, 1:], gross=added)
 
 

@@ -47,7 +47,7 @@ def at_once(
     axes: Sequence[Axis],
 ) -> Raw:  # fmt: skip
     """The sums over cells. members: (M,), whose they are; rows: (variables, 2, M), of the frames, between which."""
-    here = {n: map_arrays(v, lambda a: a[members] if a.ndim else a) for n, v in env.items()}
+    here = {n: map_arrays(v, lambda a: a.take(members) if a.ndim else a) for n, v in env.items()}
     cells = _Cells(plan, face, here, rows, axes)
     tracking = machine.tracking()
     few = [axis.few for axis in axes]
