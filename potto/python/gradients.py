@@ -17,7 +17,8 @@ from msgspec.structs import asdict, replace
 from potto.kernels.cells import Cell, Value, all_cells, map_cells, pad
 from potto.kernels.chunks import POINTS
 from potto.kernels.errors import wrong_call
-from potto.kernels.tape import Node, Swept, Untaped, swept
+from potto.kernels.sweeps import Swept, swept
+from potto.kernels.tape import Node, Untaped
 from potto.projects.settings import current
 from potto.python.accepting import as_given
 from potto.python.arguments import Batch, value_of

@@ -15,7 +15,8 @@ import numpy as np
 
 from potto.integrate.events import OneSidedDerivatives, TwoSided
 from potto.kernels.cells import Array, Bools, Cell, Rows, Value, all_cells, map_cells
-from potto.kernels.tape import Node, reached
+from potto.kernels.sweeps import reached
+from potto.kernels.tape import Node
 from potto.python.moving import with_places
 from potto.runtime.answers.convergence import merged
 from potto.runtime.evaluation.record import Record

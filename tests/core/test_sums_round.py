@@ -70,3 +70,19 @@ def test_sums_cover_what_they_round_off(n: int, t: object) -> None:
 def test_slopes_that_are_whole_numbers_are_exact() -> None:
     answer = potto.grad(potto.compile("def f(t) sum i in 1..100 (i*t)").f)(0.25)
     assert answer.tangent == 5050 and answer.tangent_error == 0.0
+
+
+PICKED = potto.compile("""
+def evenly(a: [50] Real, n) sum i in 0..n-1 (0.1*a[i - 50*floor(i/50)])
+def mostly_the_last(a: [50] Real, n) sum i in 0..n-1 (0.1*a[min(i, 49)])
+""")
+
+
+@pytest.mark.parametrize("n", [5000, 500_000])
+def test_gradients_cover_what_they_round_off(n: int) -> None:
+    """By so many elements a gradient is swept back: what comes to an element from all who read it is added up."""
+    for f, often in ((PICKED.evenly, [n // 50] * 50), (PICKED.mostly_the_last, [1] * 49 + [n - 49])):
+        answer = potto.grad(f, "a")(np.full(50, 0.3), n)
+        for slope, error, times in zip(*map(np.ravel, (answer.tangent, answer.tangent_error)), often, strict=True):
+            exact = times * Fraction(0.1)
+            assert abs(Fraction(float(slope)) - exact) <= Fraction(float(error)) < 1e-11 * exact

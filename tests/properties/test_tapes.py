@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 from how_many import examples
 
-from potto.kernels.tape import Node, Untaped, leaves, linear, pushed, scaled, swept
+from potto.kernels.sweeps import pushed, swept
+from potto.kernels.tape import Node, Untaped, leaves, linear, scaled
 
 SIZE = 4
 

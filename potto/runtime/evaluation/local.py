@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 
 from potto.kernels.cells import Cell, Env, Number, Value, all_cells, map_cells, pad
-from potto.kernels.tape import Node, every_leaf, leaves, linear, pushed
+from potto.kernels.sweeps import pushed
+from potto.kernels.tape import Node, every_leaf, leaves, linear
 from potto.runtime.evaluation.machine import Machine
 
 Run = Callable[[Machine, Env], Value]

@@ -1,6 +1,6 @@
 """`sum i in lo..hi (e)`: the terms as one more axis of the batch.
 
-Owns `total`, `plus` and `PAIRWISE`. Where no side is forced in the terms, all of them are evaluated in one go, in
+Owns `total` and `plus`. Where no side is forced in the terms, all of them are evaluated in one go, in
 chunks; of those that are in proportion to a tent only the few that are not 0.
 """
 
@@ -17,16 +17,13 @@ from potto.diagnostics import PottoError
 from potto.kernels import errors
 from potto.kernels.cells import Cell, Number, Rows, Trace, Value, all_arrays, combined, listed, map_arrays, map_cells
 from potto.kernels.tape import Node
-from potto.kernels.whole import LARGEST, ROUNDING, SHORT, UNIT_ROUNDOFF, looked_through
+from potto.kernels.whole import LARGEST, PAIRWISE, ROUNDING, SHORT, looked_through
 from potto.runtime.answers.allowances import NOTHING
 from potto.runtime.evaluation.machine import Machine
 from potto.runtime.evaluation.selection import Pick, apart
 
 MOST_TERMS = 10_000_000
 CHUNK = 1 << 18
-# What numpy's pairwise sums round off, as a part of what is added up: at most 6.7 units for equal numbers, of which
-# rounding goes one way, of 3,000 from 8 to 260,000.
-PAIRWISE = 8 * UNIT_ROUNDOFF
 
 
 def total(machine: Machine, term: Sum, lo: Value, hi: Value, env: dict[str, Value], trace: Trace | None) -> Value:

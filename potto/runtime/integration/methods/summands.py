@@ -21,11 +21,11 @@ from potto.integrate.columns import distinct
 from potto.kernels import errors
 from potto.kernels.cells import Array, Bools, Cell, Number, Value, all_arrays, combined, map_arrays, pad
 from potto.kernels.tape import Node
-from potto.kernels.whole import ROUNDING
+from potto.kernels.whole import PAIRWISE, ROUNDING
 from potto.runtime.answers.allowances import NOTHING
 from potto.runtime.evaluation.functions import Closure, Derivative
 from potto.runtime.evaluation.machine import Machine
-from potto.runtime.evaluation.sums import CHUNK, PAIRWISE
+from potto.runtime.evaluation.sums import CHUNK
 from potto.runtime.integration.problem import linked
 
 Slots = tuple[int, ...]  # the directions in which a member moves

@@ -20,12 +20,13 @@ from potto.integrate.pieces import still
 from potto.kernels.cells import Array, Cell, Env, Ints, Rows, Value, all_arrays, map_arrays, map_cells
 from potto.kernels.making import making
 from potto.kernels.tape import Edge, Node
+from potto.kernels.whole import PAIRWISE
 from potto.runtime.answers.allowances import NOTHING
 from potto.runtime.answers.convergence import merged
 from potto.runtime.evaluation.functions import Closure
 from potto.runtime.evaluation.machine import Machine
 from potto.runtime.evaluation.reach import Reach, kept
-from potto.runtime.evaluation.sums import PAIRWISE, plus
+from potto.runtime.evaluation.sums import plus
 from potto.runtime.integration.preparation.arrays import holds, in_names
 from potto.runtime.integration.preparation.prepared import filled
 
