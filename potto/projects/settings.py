@@ -1,13 +1,14 @@
 """How numbers are asked for: the method, the accuracy and the limits of an evaluation.
 
 Owns `Settings` and the settings in force, which belong to the thread (or task) that set them. Knows nothing of what
-obeys them: the runtime reads them, the faces set them.
+obeys them: the runtime reads them, the faces set them. `respelled` writes advice as each face has its settings.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+import re
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import TYPE_CHECKING, Literal, get_args
@@ -123,6 +124,20 @@ def problem(name: str, value: object) -> str | None:
     if not isinstance(value, int):
         return f"{name} must be a whole number, not {value!r}"
     return None if value >= least else f"{name} must be at least {least}, not {value!r}"
+
+
+_OPTION = re.compile(r"`--([a-z-]+)(?: ([^`]+))?`")
+
+
+def respelled(advice: str, spell: Callable[[str, str | None], str]) -> str:
+    """Advice, which names settings as options of the command line (`--max-evals 1000`), as another face writes them:
+    `spell` is given the name of each, with the value if there is one. Options that are no settings stay."""
+
+    def spelled(option: re.Match[str]) -> str:
+        name = option[1].replace("-", "_")
+        return f"`{spell(name, option[2])}`" if name in Settings.__struct_fields__ else option[0]
+
+    return _OPTION.sub(spelled, advice)
 
 
 @contextmanager

@@ -13,6 +13,7 @@ from typing import Any, Literal
 from msgspec import Struct
 from msgspec.structs import replace
 
+from potto.projects.settings import respelled
 from potto.reports.render import Located, Palette, Sources, broken, render, to_json
 from potto.source import SourceText
 
@@ -167,12 +168,8 @@ def diagnostic(located: Located, sources: Sources) -> Part:
 def _for_a_prompt(located: Located) -> Located:
     """With options of the command line as they are set here: `--max-evals` is `:set max_evals`."""
     found = located.diagnostic
-    help = re.sub(r"`--([a-z-]+)( [^`]+)?`", _setting, found.help)
+    help = respelled(found.help, lambda name, value: " ".join(filter(None, (":set", name, value))))
     return located if help == found.help else replace(located, diagnostic=replace(found, help=help))
-
-
-def _setting(option: re.Match[str]) -> str:
-    return f"`:set {option[1].replace('-', '_')}{option[2] or ''}`"
 
 
 def diagnostics(found: Iterable[Located], sources: Sources) -> list[Part]:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import potto
+from potto.projects.settings import respelled
 from potto.runtime.answers.printing import attainable
 
 # Programs that a small budget is too little for, and their values by mathematics.
@@ -77,3 +78,9 @@ def test_no_integral_is_to_blame_where_there_is_none() -> None:
     """The derivative of sqrt(k*x) by x at k = 0 is infinity times 0."""
     one = potto.grad(potto.compile("def f(k, x) sqrt(k*x)\n").f, "x")(0.0, 1.0)
     assert not one.converged and [why.message for why in one.shortfalls] == ["the value is not a number"]
+
+
+def test_only_settings_are_spelled_as_another_face_has_them():
+    advice = "sample more (`--samples`), integrate by `--method quadrature`, or leave out `--over c=0..1`"
+    spelled = respelled(advice, lambda name, value: f"{name}={value}")
+    assert spelled == "sample more (`samples=None`), integrate by `method=quadrature`, or leave out `--over c=0..1`"

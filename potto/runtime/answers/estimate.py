@@ -7,7 +7,6 @@ None with its text in `text`. An estimate is a number, and an array, itself: the
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from functools import reduce
 from operator import or_
@@ -18,6 +17,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from potto.integrate.events import Shortfall
+from potto.projects.settings import respelled
 from potto.runtime.answers.arithmetic import Operators, Pair, applied, operand, reduced
 from potto.runtime.answers.named import WithFields
 from potto.runtime.answers.printing import (
@@ -133,7 +133,7 @@ class Estimate(Operators, WithFields, Struct, frozen=True, eq=False):
     def advice(self) -> str:
         """What helps against the reasons, each advice once, as Python says it; with the accuracy that can be had, where
         that is known: `potto.settings(rtol=1e-3)`."""
-        return re.sub(r"`--([a-z-]+)(?: ([^`]+))?`", _setting, self.options)
+        return respelled(self.options, _of_python)
 
     @property
     def options(self) -> str:
@@ -313,11 +313,10 @@ class Estimate(Operators, WithFields, Struct, frozen=True, eq=False):
         return self._parts, self.error if self.tangent is None else (self.error, self.tangent_error)
 
 
-def _setting(option: re.Match[str]) -> str:
-    """`--rtol 1e-3` as a setting of Python's."""
-    name, value = option[1].replace("-", "_"), option[2] or "…"
-    value = f'"{value}"' if value[0].isalpha() else value
-    return f"`potto.settings({name}={value})`"
+def _of_python(name: str, value: str | None) -> str:
+    """A setting as Python's: `potto.settings(rtol=1e-3)`."""
+    value = value or "…"
+    return f'potto.settings({name}="{value}")' if value[0].isalpha() else f"potto.settings({name}={value})"
 
 
 def _plain(estimate: Estimate, changes: Mapping[str, Any]) -> Estimate:
