@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import logging
 import os
+import re
 import select
 from collections.abc import Iterable, Iterator
 from queue import SimpleQueue
@@ -17,6 +18,7 @@ from typing import Any, BinaryIO
 
 logger = logging.getLogger(__name__)
 MOST_BYTES = 256_000_000  # of one message; a header that says more is broken
+_OF_A_BROWSER = re.compile(rb"[A-Z]+ \S+ HTTP/")
 
 
 class BadMessage(ValueError):
@@ -44,7 +46,11 @@ def _messages(stream: BinaryIO) -> Iterator[Any]:
 
 
 def _header(stream: BinaryIO) -> int | None:
-    """The length of the next body; None at the end. Field names are in any case; lines may end in a bare LF."""
+    """The length of the next body; None at the end. Field names are in any case; lines may end in a bare LF.
+
+    What begins as a request of HTTP ends the conversation: any web page could send one to a socket of this computer,
+    with a message as its body.
+    """
     length: int | None = None
     while line := stream.readline(4096):
         line = line.strip()
@@ -52,6 +58,9 @@ def _header(stream: BinaryIO) -> int | None:
             name, colon, value = line.partition(b":")
             if colon and name.strip().lower() == b"content-length":
                 length = _length(value)
+            elif _OF_A_BROWSER.match(line):
+                logger.error("a browser is no client: %r", line[:80])
+                return None
             elif not colon:
                 logger.error("a line that is not a header field: %r", line[:80])
         elif length is not None:

@@ -175,6 +175,13 @@ def test_messages_that_end_too_early() -> None:
     assert list(messages(io.BytesIO(b"Content-Length: 99999999999999\r\n\r\n"))) == []
 
 
+@pytest.mark.parametrize("first", [b"POST / HTTP/1.1", b"GET /chat HTTP/1.1"])
+def test_a_web_page_cannot_speak_to_the_server(first: bytes) -> None:
+    request = first + b"\r\nHost: localhost:7\r\nOrigin: https://elsewhere\r\nContent-Length: 2\r\n\r\n{}"
+    assert list(messages(io.BytesIO(request))) == []
+    assert list(messages(io.BytesIO(b"Content-Length: 2\r\n\r\n{}" + request))) == [{}]
+
+
 def test_a_server_that_cannot_start_its_analysis_ends() -> None:
     """It would answer nothing for ever; one that ends is started again."""
     code = (
