@@ -60,7 +60,7 @@ def _format_chunk(text: str, diffeo: bool) -> str:
     return laid_out if same else text
 
 
-@dataclass(slots=True)
+@dataclass(eq=False, repr=False, slots=True)
 class _Line:
     """A line to be: the tokens from `first` up to `last`."""
 

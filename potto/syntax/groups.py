@@ -38,7 +38,7 @@ from potto.syntax.tokens import Token
 Values = list[Any]
 
 
-@dataclass(slots=True)
+@dataclass(eq=False, repr=False, slots=True)
 class Context:
     """What the reductions share: the chunk's text and the messages so far."""
 

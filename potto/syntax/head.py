@@ -14,7 +14,7 @@ _State = Literal["start", "name", "groups", "type", "sized", "typed", "for", "di
 _PENDING = frozenset({"groups", "sized", "typed", "for", "ready"})
 
 
-@dataclass(slots=True)
+@dataclass(eq=False, repr=False, slots=True)
 class BlockTracker:
     """`indents` are the columns of the open blocks; `state` says how far the head on this line has come."""
 

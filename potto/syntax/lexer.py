@@ -56,7 +56,7 @@ class Lexed:
     never_closed: frozenset[int]
 
 
-@dataclass(slots=True)
+@dataclass(eq=False, repr=False, slots=True)
 class _Lexer:
     text: str
     clauses: bool

@@ -28,7 +28,7 @@ _BRACKET = re.compile(r"#[^\n]*|[()\[\]]")
 _DIFFERENTIATES = re.compile(r"\s*d\s*\(")
 
 
-@dataclass(slots=True)
+@dataclass(eq=False, repr=False, slots=True)
 class _Open:
     """A bracket with the indentation of its line, or a `let`, `sum` or `integral` with its depth of brackets."""
 
@@ -37,7 +37,7 @@ class _Open:
     depth: int
 
 
-@dataclass(slots=True)
+@dataclass(eq=False, repr=False, slots=True)
 class Nesting:
     """`unclosed` are the brackets that are known to have no end, from a first reading."""
 

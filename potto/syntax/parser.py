@@ -53,7 +53,7 @@ class ParsedExpression:
     diagnostics: tuple[Diagnostic, ...]
 
 
-@dataclass(slots=True)
+@dataclass(eq=False, repr=False, slots=True)
 class _Parse:
     """What came of a chunk's tokens, with the repairs made in them. `value` is None where it had to be given up."""
 

@@ -21,7 +21,7 @@ _TYPES = frozenset({"Real", "Dist", "Diffeo"})
 _BREAK_BEFORE = frozenset({"THEN", "ELSE", "QMARK", "D", "INVERSE", "WHERE"})
 
 
-@dataclass(slots=True)
+@dataclass(eq=False, repr=False, slots=True)
 class Spaced:
     """A written token, whether a blank stands before it, and what the layout must know of it."""
 
@@ -41,7 +41,7 @@ class Spaced:
     """Whether the body of a `def` begins with it on the line of the head."""
 
 
-@dataclass(slots=True)
+@dataclass(eq=False, repr=False, slots=True)
 class _Bracket:
     kind: str
     bounds: bool

@@ -36,7 +36,7 @@ from potto.types.values import (
 )
 
 
-@dataclass
+@dataclass(eq=False, repr=False)
 class Substitution:
     """What stands for which symbolic input. `functions`: what is given for an input that is a function; `effects`: of
     the function that is called."""

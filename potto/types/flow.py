@@ -57,7 +57,7 @@ def walks(*node_types: type) -> Callable[[F], F]:
     return register
 
 
-@dataclass
+@dataclass(eq=False, repr=False)
 class Frame:
     """A function (or definition) being walked: what is its own, and what happens when it is called."""
 

@@ -32,7 +32,7 @@ from potto.types.types import Meta, Type, place_of
 LocalKind = Literal["parameter", "local", "variable", "index", "loop", "size"]
 
 
-@dataclass(eq=False, slots=True)
+@dataclass(eq=False, repr=False, slots=True)
 class Local:
     """A name that is bound inside a definition. `known`: its value is a function whose parameters have names.
 
@@ -83,7 +83,7 @@ class ModuleName:
 Meaning = Local | InterfaceName | RecursiveName | BuiltinName | ModuleName
 
 
-@dataclass
+@dataclass(eq=False, repr=False)
 class Outside:
     """What a file provides to the definition that is looked at: `known` by `(path or None, name)`.
 

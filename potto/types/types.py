@@ -139,7 +139,7 @@ class Unknown:
     """The type of what is wrong. It fits everything, so that one mistake gives one message."""
 
 
-@dataclass(eq=False, slots=True)
+@dataclass(eq=False, repr=False, slots=True)
 class Meta:
     """A type that inference does not know yet. `level`: the depth of the binding that it belongs to.
 

@@ -25,7 +25,7 @@ SinkKind = Literal["condition", "jump", "sum", "count", "index", "equality", "de
 NOWHERE = Span(0, 0)
 
 
-@dataclass(eq=False, slots=True)
+@dataclass(eq=False, repr=False, slots=True)
 class Source:
     """Where variation comes from. `number` is set for those of an interface; `origin` for another definition's."""
 
@@ -94,7 +94,7 @@ class ListValue:
     item: Value
 
 
-@dataclass(eq=False, slots=True)
+@dataclass(eq=False, repr=False, slots=True)
 class Port:
     """A place where an unknown function is given something."""
 
@@ -124,7 +124,7 @@ class NoPort:
 PortTree = Port | PortTuple | PortFunction | NoPort
 
 
-@dataclass(eq=False, slots=True)
+@dataclass(eq=False, repr=False, slots=True)
 class Sink:
     """A place that must not vary. `origin` tells the definition of a place elsewhere, `number` its input there."""
 
