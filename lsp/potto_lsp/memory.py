@@ -27,7 +27,7 @@ def loading() -> Iterator[None]:
         gc.freeze()
 
 
-def settle() -> None:
+def begin_collecting() -> None:
     """Exempt what exists now; from here on there are collections."""
     gc.freeze()
     gc.set_threshold(*THRESHOLDS)

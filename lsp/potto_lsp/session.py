@@ -170,7 +170,7 @@ class ClientSession:
         self.analysis.dismiss_helpers()
         self.checked = self.analysis.settled = True
         self._progress.end()
-        memory.settle()
+        memory.begin_collecting()
 
     def close(self) -> None:
         """The session ends."""

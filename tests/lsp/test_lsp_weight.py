@@ -166,7 +166,7 @@ def test_what_was_loaded_is_never_collected_again() -> None:
     try:
         with memory.loading():
             assert not gc.isenabled()
-        memory.settle()
+        memory.begin_collecting()
         assert gc.isenabled() and gc.get_freeze_count() > 10_000
         assert gc.get_threshold() == memory.THRESHOLDS and memory.THRESHOLDS[0] >= 50_000
     finally:
@@ -178,7 +178,7 @@ def test_new_objects_are_looked_through_once_open_files_have_been_told_of() -> N
     """Where that waits until a collection comes by itself, it comes in the middle of a key, and takes 10 to 40 ms."""
     before = gc.get_threshold()
     try:
-        memory.settle()
+        memory.begin_collecting()
         for look, generation, many in ((memory.tidy, 0, memory.YOUNG), (memory.rest, 1, memory.MIDDLE)):
             gc.collect(generation)
             looked = gc.get_stats()[generation]["collections"]
