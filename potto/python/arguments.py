@@ -310,7 +310,7 @@ def misfit(name: str, argument: Any, type: Type, own: Type | None) -> str | None
     type = resolve(type)
     if isinstance(type, Real) and own is None and isinstance(argument, float | int):
         return None
-    complaint = _complaint(name, argument, type, own)
+    complaint = _complaint(argument, type, own)
     if complaint is None:
         return _misfit_inside(name, argument, type)
     return f"`{name}` is {format_type(type)}: {complaint}"
@@ -335,7 +335,7 @@ def _misfit_inside(name: str, argument: Any, type: Type) -> str | None:
     return next((why for why in found if why is not None), None)
 
 
-def _complaint(name: str, argument: Any, type: Type, own: Type | None) -> str | None:
+def _complaint(argument: Any, type: Type, own: Type | None) -> str | None:
     match type:
         case Function() | Diffeo():
             if own is None:

@@ -146,15 +146,15 @@ def keyword(_: Context, v: Values) -> ListedItem:
 
 
 def paren_empty(_: Context, v: Values) -> Parenthesized:
-    return Parenthesized(Span(v[0].start, v[1].end), (), False, not v[0].text)
+    return Parenthesized(Span(v[0].start, v[1].end), (), not v[0].text)
 
 
 def paren(_: Context, v: Values) -> Parenthesized:
-    return Parenthesized(Span(v[0].start, v[2].end), tuple(v[1]), False, not v[0].text)
+    return Parenthesized(Span(v[0].start, v[2].end), tuple(v[1]), not v[0].text)
 
 
 def paren_comma(_: Context, v: Values) -> Parenthesized:
-    return Parenthesized(Span(v[0].start, v[3].end), tuple(v[1]), True, not v[0].text)
+    return Parenthesized(Span(v[0].start, v[3].end), tuple(v[1]), not v[0].text)
 
 
 # Expressions

@@ -231,7 +231,7 @@ def _split_semicolon(group: Parenthesized) -> list[Parenthesized]:
         if written.separator == ";":
             parts.append([])
         parts[-1].append(written._replace(separator=""))
-    return [Parenthesized(group.span, tuple(part), False, group.virtual) for part in parts]
+    return [Parenthesized(group.span, tuple(part), group.virtual) for part in parts]
 
 
 def _diffeo_equation(context: Context, left: Name, body: Expr, clauses: Values, span: Span) -> Item:

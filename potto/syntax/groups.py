@@ -65,7 +65,6 @@ class Parenthesized(NamedTuple):
 
     span: Span
     written: tuple[ListedItem, ...]
-    trailing: bool
     virtual: bool
 
 

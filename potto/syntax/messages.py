@@ -133,7 +133,7 @@ def describe(stop: Stop, edits: list[RepairStep]) -> Diagnostic:
         return special
     edit = edits[0] if edits else RepairStep("delete", stop.at.kind)
     if edit.action == "replace":
-        return _replaced(stop, edit)
+        return _replaced(stop)
     if edit.action == "insert":
         return _inserted(stop, edit.kind)
     return _unexpected(stop)
@@ -186,7 +186,7 @@ def _special(stop: Stop) -> Diagnostic | None:
         return kinds.BAD_IMPORT(at.span, "an import says which names it takes", help="list the names instead of `*`")
     if at.kind == "COMMA" and stop.values and isinstance(stop.values[0], Token) and stop.values[0].kind == "IMPORT":
         return kinds.BAD_IMPORT(at.span, "one `import` takes one module", help="write an `import` for each")
-    if opened is not None and opened.kind == "LSQB" and _is_interval(stop, opened):
+    if opened is not None and opened.kind == "LSQB" and _is_interval(stop):
         return kinds.UNFINISHED(opened.span.cover(stop.place), "an interval has two ends", help="write `[lo, hi]`")
     loop = stop.last("FOR")
     if loop is not None and "INDENT" in stop.possible and not at.text:
@@ -261,7 +261,7 @@ def _among_fields(stop: Stop) -> bool:
     return bool(open_at) and stop.tokens[open_at[-1] - 1].kind == "WITH"
 
 
-def _is_interval(stop: Stop, opened: Token) -> bool:
+def _is_interval(stop: Stop) -> bool:
     """Whether the open bracket is a bound of an integral that lacks its other end."""
     return "RSQB" not in stop.possible and "COMMA" in stop.possible and stop.at.kind == "RSQB"
 
@@ -270,7 +270,7 @@ def _from(opened: Token) -> tuple[Related, ...]:
     return (Related(opened.span, f"this `{opened.text}`"),)
 
 
-def _replaced(stop: Stop, edit: RepairStep) -> Diagnostic:
+def _replaced(stop: Stop) -> Diagnostic:
     at = stop.at
     if at.kind == "EQ" and stop.before is not None and stop.before == stop.continues:
         return kinds.INDENTATION(

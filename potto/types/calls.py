@@ -73,7 +73,7 @@ def _apply(inference: Inference, node: nodes.Apply) -> Type:
     if isinstance(callee, Unknown):
         return UNKNOWN
     if not isinstance(callee, Function):
-        inference.report(_not_a_function(inference, node, callee))
+        inference.report(_not_a_function(node, callee))
         return UNKNOWN
     variadic = _variadic(inference, node, types)
     if variadic is not None:
@@ -146,7 +146,7 @@ def _variadic(inference: Inference, node: nodes.Apply, types: Sequence[Type]) ->
     return REAL
 
 
-def _not_a_function(inference: Inference, node: nodes.Apply, callee: Type) -> Diagnostic:
+def _not_a_function(node: nodes.Apply, callee: Type) -> Diagnostic:
     after = node.arguments[0].value if node.arguments else None
     is_number = isinstance(callee, Real)
     help, suggestions = "", tuple[Suggestion, ...]()

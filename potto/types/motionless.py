@@ -55,7 +55,7 @@ def check_tangents(inference: Inference, node: nodes.Apply) -> None:
         if first is None and call.arguments:
             first = call.arguments[0].value
     if first is not None:
-        inference.report(_motionless(inference, node, calls, head, first))
+        inference.report(_motionless(inference, calls, head, first))
 
 
 def is_derivative(inference: Inference, expr: nodes.Expr) -> bool:
@@ -120,9 +120,7 @@ def _is_plain(type: Type) -> bool:
     return isinstance(resolve(type), Real | Dist)
 
 
-def _motionless(
-    inference: Inference, node: nodes.Apply, calls: Sequence[nodes.Apply], head: nodes.Expr, first: nodes.Expr
-) -> Diagnostic:
+def _motionless(inference: Inference, calls: Sequence[nodes.Apply], head: nodes.Expr, first: nodes.Expr) -> Diagnostic:
     innermost = calls[-1]
     plan = inference.plans[id(innermost)]
     first = without_parentheses(first)
