@@ -76,6 +76,25 @@ def test_a_signature_is_checked_against_its_users_alone_and_only_they_are_told(s
         assert counts == ([1, USES, USES] if turn % 2 == 0 else [0, 0, 0])  # `k` is not known
 
 
+SPOT = "record Spot(at: (Real, Real), r: Real)\n"
+LIT = "".join(f"\ndef lit{n}(s: Spot, t) integral [0, 1] [x + s.r < t] * {n}*x d(x)\n" for n in range(OTHERS))
+
+
+@pytest.mark.parametrize("wrong", ["1r: Real", "r: Reel"])
+def test_what_uses_a_record_is_not_looked_through_for_conditions_while_that_is_wrong(
+    session: Session, wrong: str
+) -> None:
+    """Of its fields there is only a guess; one edit more brings everything back."""
+    session.edit("leaf", SPOT + LIT)
+    session.check()
+    for _ in range(2):
+        ran = session.ran("leaf", SPOT.replace("r: Real", wrong) + LIT)
+        assert {said["code"] for said in session.told[0]["diagnostics"]} <= {"P0103", "P0111", "P0116"}
+        assert ran["core"] <= 1 and ran["exported"] <= 1, ran
+        assert session.ran("leaf", SPOT + LIT)["core"] <= 1
+        assert session.told[0]["diagnostics"] == []
+
+
 def test_what_nobody_reads_is_looked_at_by_nobody(session: Session) -> None:
     for body in ("2*t", "3*t", "4*t"):
         reused = session.ran("leaf", LEAF.replace("alone(t) t", f"alone(t) {body}"), "reused")

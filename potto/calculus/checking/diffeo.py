@@ -57,11 +57,13 @@ from potto.core.terms import (
 from potto.diagnostics import Diagnostic, PottoError
 from potto.elaborate import core, core_term, diffeo_core
 from potto.modules import chunk_text, definition
+from potto.modules.graph import dependencies
 from potto.query import Database, query
 from potto.source import Span
 from potto.syntax import nodes
 from potto.syntax.walk import walk
-from potto.types import check_definition, interface
+from potto.types import check_definition, interface, shape
+from potto.types.types import TupleOf, result_of
 
 _Bounds = tuple[tuple[str, tuple[float, float]], ...]
 
@@ -97,7 +99,7 @@ def check_conditions(db: Database, file: str, name: str) -> tuple[Diagnostic, ..
     item = definition(db, file, name)
     if isinstance(item, nodes.DiffeoDefinition):
         return _studied(db, file, name).diagnostics
-    if not may_integrate(db, file, name):
+    if not may_integrate(db, file, name) or _of_unknown_records(db, file, name):
         return ()
     elaborated = core(db, file, name)
     found = conditions_of(elaborated.term, lambda g: exported(db, g.module, g.name), lambda g: _faultless(db, g))
@@ -106,6 +108,17 @@ def check_conditions(db: Database, file: str, name: str) -> tuple[Diagnostic, ..
     products = _products(db, elaborated.term, found, spans, fallback)
     maps = _maps(item, chunk_text(db, file, name))
     return (*_judged(found, spans, fallback, maps, lambda g: _whole(db, g)), *products)
+
+
+def _of_unknown_records(db: Database, file: str, name: str) -> bool:
+    """Whether a definition uses a record that is wrong itself: what its guessed fields would lead to is no fault of who
+    uses them."""
+    return any(
+        isinstance(made := result_of(shape(db, used.file, used.name)), TupleOf)
+        and made.record is not None
+        and not is_sound(db, used.file, used.name)
+        for used in dependencies(db, file, name)
+    )
 
 
 def _maps(item: nodes.Definition | None, text: str | None) -> frozenset[Span]:
