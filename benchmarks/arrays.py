@@ -1,7 +1,7 @@
 """What programs with arrays cost: meshes, observations, steps in time, beside their goals.
 
 `python benchmarks/arrays.py [--backend numpy|native] [--large] [--plot FILE]`. Every figure is the least time of the
-processor of several warm calls; the error of the pictures is against clipping each triangle at each pixel (`clipped`),
+processor of several warm calls; the error of the pictures is against clipping each triangle at each pixel (`covered`),
 which knows nothing of Potto. A plot shows time against triangles, pixels, and what is visible: pairs of both that meet.
 """
 
@@ -13,6 +13,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from paper_programs import clipped
 
 import potto
 
@@ -46,20 +47,12 @@ def mesh(side: int) -> tuple[np.ndarray, np.ndarray]:
     return both.reshape(-1, 3, 2), rng.uniform(0, 1, 2 * side * side)
 
 
-def clipped(triangle: np.ndarray, x: float, y: float, h: float) -> float:
-    """The area of a triangle in a square (Sutherland and Hodgman 1974)."""
-    polygon = [tuple(p) for p in triangle]
-    for axis, bound, sign in ((0, x, 1), (0, x + h, -1), (1, y, 1), (1, y + h, -1)):
-        out = []
-        for p, q in zip(polygon, polygon[1:] + polygon[:1], strict=True):
-            u, v = sign * (p[axis] - bound), sign * (q[axis] - bound)
-            if u >= 0:
-                out.append(p)
-            if u * v < 0:
-                s = u / (u - v)
-                out.append((p[0] + s * (q[0] - p[0]), p[1] + s * (q[1] - p[1])))
-        polygon = out
-    return abs(sum(p[0] * q[1] - q[0] * p[1] for p, q in zip(polygon, polygon[1:] + polygon[:1], strict=True))) / 2
+def covered(triangle: np.ndarray, x: float, y: float, h: float) -> float:
+    """The area of a triangle in a square."""
+    polygon = clipped(tuple(((triangle - (x, y)) / h).ravel()))
+    return (
+        h * h * abs(sum(p[0] * q[1] - q[0] * p[1] for p, q in zip(polygon, polygon[1:] + polygon[:1], strict=True))) / 2
+    )
 
 
 def picture(triangles: np.ndarray, grey: np.ndarray, size: int) -> np.ndarray:
@@ -69,7 +62,7 @@ def picture(triangles: np.ndarray, grey: np.ndarray, size: int) -> np.ndarray:
         (i0, j0), (i1, j1) = (np.clip((f(triangle, axis=0) * size).astype(int), 0, size - 1) for f in (np.min, np.max))
         for i in range(i0, i1 + 1):
             for j in range(j0, j1 + 1):
-                out[i, j] += g * clipped(triangle, i * h, j * h, h)
+                out[i, j] += g * covered(triangle, i * h, j * h, h)
     return out
 
 

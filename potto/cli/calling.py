@@ -16,6 +16,18 @@ if TYPE_CHECKING:
 _IN_PROGRAMS = re.compile(r"\w+(\.\w+|\[[^][]*\])*")
 
 
+def with_values(arguments: list[str], *options: str) -> list[str]:
+    """Words of a command line, with the values of some options joined to them, since they may begin with a minus:
+    `--box -1,1` as `--box=-1,1`."""
+    joined: list[str] = []
+    for word in arguments:
+        if joined and joined[-1] in options:
+            joined[-1] += f"={word}"
+        else:
+            joined.append(word)
+    return joined
+
+
 def assignment(text: str) -> tuple[str, str]:
     """`name=EXPR` as a pair; for argparse."""
     name, equals, expression = text.partition("=")

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from msgspec.structs import asdict
 
-from potto.cli.calling import add_set, argument_in, arguments_in, assignment, called, function_in
+from potto.cli.calling import add_set, argument_in, arguments_in, assignment, called, function_in, with_values
 from potto.cli.console import Console
 from potto.cli.numbers import accounts, add_options, settings_of, show_stats
 
@@ -61,14 +61,8 @@ def _bound(text: str) -> tuple[str, tuple[float, float]]:
 
 
 def prepare(arguments: list[str]) -> list[str]:
-    """Let a target begin with a minus: `--target -1` as `--target=-1`."""
-    joined: list[str] = []
-    for word in arguments:
-        if joined and joined[-1] == "--target":
-            joined[-1] += f"={word}"
-        else:
-            joined.append(word)
-    return joined
+    """Let a target begin with a minus."""
+    return with_values(arguments, "--target")
 
 
 def run(options: argparse.Namespace, console: Console) -> int:

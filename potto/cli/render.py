@@ -9,7 +9,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
-from potto.cli.calling import add_set, assignment, called
+from potto.cli.calling import add_set, assignment, called, with_values
 from potto.cli.console import Console
 from potto.cli.numbers import accounts, add_options, add_workers, settings_of, show_stats
 
@@ -159,14 +159,8 @@ def _tones(text: str) -> tuple[str, str]:
 
 
 def prepare(arguments: list[str]) -> list[str]:
-    """Let a box begin with a minus: `--box -1,1,-1,1` as `--box=-1,1,-1,1`."""
-    joined: list[str] = []
-    for word in arguments:
-        if joined and joined[-1] in ("--box", "--viewport", "--range"):
-            joined[-1] += f"={word}"
-        else:
-            joined.append(word)
-    return joined
+    """Let a box begin with a minus."""
+    return with_values(arguments, "--box", "--viewport", "--range")
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
