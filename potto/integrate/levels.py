@@ -73,6 +73,7 @@ class Corners(Struct, frozen=True):
     numbers: Lam
     further_in: str
     surfaces: Lam
+    polynomial: Lam | None
 
 
 class Group(Struct, frozen=True):
@@ -141,7 +142,8 @@ def level_plan(level: Level, decided: tuple[int, ...], groups: Sequence[Group]) 
 def _corners(cut: int, region: CircularRegion) -> Corners:
     numbers = (number for edge in (*region.lines, *region.circles) for number in edge)
     surfaces = function_of(tuple_(region.surfaces))
-    return Corners(cut, len(region.lines), function_of(tuple_(tuple(numbers))), region.further_in, surfaces)
+    polynomial = None if region.polynomial is None else function_of(region.polynomial)
+    return Corners(cut, len(region.lines), function_of(tuple_(tuple(numbers))), region.further_in, surfaces, polynomial)
 
 
 def _walls(level: Level, rows: Sequence[tuple[int, bool]]) -> tuple[tuple[tuple[int, ...], ...], Lam]:

@@ -1,54 +1,66 @@
-"""Half planes, discs and their complements outside of which nothing is integrated: the corners of what they leave.
+"""Regions that lines and circles bound, intersections, unions and whatever is made of both: their corners.
 
-Owns `circular_region`. Of n lines and circles in a plane n^2/2 pairs cross; what lies outside of one of the others
-leaves nothing that is not smooth. Which crossings those are the parameters decide, so numbers find them
-(`integrate/decomposition/corners`).
+Owns `circular_region`. Of n lines and circles in a plane n^2/2 pairs cross; what lies outside of what is integrated, or
+within a union of others, leaves nothing that is not smooth. Which crossings those are the parameters decide, so numbers
+find them (`integrate/decomposition/corners`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from fractions import Fraction
 
 from potto.calculus.algebra.affine import affine
 from potto.calculus.algebra.polynomial_in import collect
 from potto.calculus.algebra.rational_form import is_zero, shorter
 from potto.calculus.decomposition.critical import Within
-from potto.calculus.decomposition.surface_cuts import CircularRegion, Cut
-from potto.core.terms import ONE, ZERO, Term, neg, sub, var
+from potto.calculus.decomposition.side_polynomials import Sides
+from potto.calculus.decomposition.surface_cuts import CircularRegion, Cut, side
+from potto.core.terms import ONE, ZERO, Term, mul, neg, sub, var
 
-LEAST = 6  # lines: the crossings of fewer are rows of plans that need no search
-# The same where there are circles: formulas of their crossings have more digits where circles touch, or are small and
-# far away, and take as long as all else from here on (24: 7.5 s at the first call, 0.2 without; 10: 1.0 and 0.15).
-MANY = 12
+LEAST = 6  # the crossings of fewer are rows of plans that need no search
+Polynomial = Callable[[Sides], Term | None]
 Edges = tuple[list[Cut], list[Cut]]
 
 
 def circular_region(
-    cuts: Sequence[Cut], within: Within, further: frozenset[str]
+    cuts: Sequence[Cut], within: Within, further: frozenset[str], polynomial: Polynomial | None
 ) -> tuple[CircularRegion | None, Edges]:
-    """The region that those cuts of a variable leave which have to be half planes or discs of it and the outermost one,
-    or their complements, with the lines and the circles among them; None and no cuts where there are few, or other
-    variables further out."""
+    """The region that half planes and discs of a variable and the outermost one bound, with the lines and the circles
+    among the cuts; None and no cuts where there are few, or other variables further out. polynomial: gives the
+    integrand in the sides of surfaces. Where that can't be told, those cuts count of which one side has to hold."""
     if len(further) != 1 or (within.lo.free | within.hi.free) & further:
         return None, ([], [])
     names = (*further, within.variable)
+    flat = [cut for cut in cuts if cut.product is None and (cut.holds or not (cut.bends or cut.steps))]
+    some = _region(flat, within, names, polynomial) if polynomial is not None else None
+    return some or _region([cut for cut in flat if cut.holds], within, names, None) or (None, ([], []))
+
+
+def _region(
+    cuts: Sequence[Cut], within: Within, names: Sequence[str], polynomial: Polynomial | None
+) -> tuple[CircularRegion, Edges] | None:
     lines: dict[Cut, tuple[Term, ...]] = {}
     circles: dict[Cut, tuple[Term, ...]] = {}
     for cut in cuts:
-        if cut.holds and cut.product is None:
-            if (form := affine(cut.surface, names)) is not None:
-                lines[cut] = _turned(cut, (*form.coefficients, form.rest))
-            elif (numbers := circle(cut.surface, *names)) is not None:
-                circles[cut] = _turned(cut, numbers)
-    if len(lines) + len(circles) < MANY:
-        circles.clear()
-    if len(lines) + len(circles) < LEAST:
-        return None, ([], [])
+        if (form := affine(cut.surface, names)) is not None:
+            lines[cut] = (*form.coefficients, form.rest)
+        elif (numbers := circle(cut.surface, *names)) is not None:
+            circles[cut] = numbers
+    edges = (*circles, *lines)
+    if len(edges) < LEAST:
+        return None
     bounds = (ZERO, ONE, neg(within.lo)), (ZERO, neg(ONE), within.hi)
-    y = var(within.variable)
-    surfaces = (*(cut.surface for cut in (*circles, *lines)), sub(y, within.lo), sub(y, within.hi))
-    region = CircularRegion((*lines.values(), *bounds), tuple(circles.values()), within.variable, surfaces)
+    y, by_sides = var(within.variable), None
+    if all(cut.holds for cut in edges):
+        lines, circles = ({cut: _turned(cut, of[cut]) for cut in of} for of in (lines, circles))
+    else:
+        sides = {jump.path: (side(n), jump.orientation) for n, cut in enumerate(edges) for jump in cut.jumps}
+        if polynomial is None or (by_sides := polynomial(sides)) is None:
+            return None
+        by_sides = mul(by_sides, *(var(side(len(edges) + n)) for n in range(2)))
+    surfaces = (*(cut.surface for cut in edges), sub(y, within.lo), sub(y, within.hi))
+    region = CircularRegion((*lines.values(), *bounds), tuple(circles.values()), within.variable, surfaces, by_sides)
     return region, (list(lines), list(circles))
 
 

@@ -49,6 +49,7 @@ class Cut(Struct, frozen=True):
     roots: closed-form sections, or None where they are found by numbers.
     center: nothing happens at it but that a smooth integrand may be concentrated there.
     holds: 1 or -1 where nothing is integrated but on that side of the canonical form, else 0.
+    bends: the integrand bends there as well, or is defined on one side alone, whatever its branches do.
     corners: the region whose corners it stands for, instead of a surface.
     """
 
@@ -62,6 +63,7 @@ class Cut(Struct, frozen=True):
     product: Product | None = None
     center: bool = False
     holds: int = 0
+    bends: bool = False
     corners: CircularRegion | None = None
 
     @property
@@ -82,21 +84,28 @@ class Product(Struct, frozen=True):
 
 
 class CircularRegion(Struct, frozen=True):
-    """An intersection of half planes a*x + b*y + c >= 0, of discs and their complements, q*(x^2 + y^2) + a*x + b*y + c
-    >= 0, x the variable that is cut, y the next one further in.
+    """What half planes a*x + b*y + c >= 0, and discs and their complements, q*(x^2 + y^2) + a*x + b*y + c >= 0, bound
+    together, x the variable that is cut, y the next one further in.
 
     lines: a, b and c of each; the last two are those above the lower and below the upper bound of y. circles: q, a, b
     and c. further_in: y. surfaces: of circles, then of lines, as they were written: multiplied out they lose digits.
+    polynomial: what is integrated as a polynomial in the `sides` of circles, then of lines; None for an intersection.
     """
 
     lines: tuple[tuple[Term, ...], ...]
     circles: tuple[tuple[Term, ...], ...]
     further_in: str
     surfaces: tuple[Term, ...]
+    polynomial: Term | None = None
+
+
+def side(number: int) -> str:
+    """The name of 1 where a circle or line of a region is >= 0, and else of 0."""
+    return f"side_{number}"
 
 
 class Placed(Struct):
-    """A surface, what it is a product of (up to `sign`), and what is known of it. holds: as a cut has it."""
+    """A surface, what it is a product of (up to `sign`), and what is known of it. holds, bends: as a cut has them."""
 
     face: WrittenSurface
     factors: tuple[WrittenSurface, ...]
@@ -105,6 +114,7 @@ class Placed(Struct):
     turning: bool = False
     steps: bool = False
     holds: int = 0
+    bends: bool = False
 
 
 @lru_cache(maxsize=8192)
@@ -134,10 +144,11 @@ def cut_of(placed: Placed, variable: str) -> Cut:
     for part in here:
         found = _roots(part, variable)
         if found is None:
-            return Cut(surface, key, jumps, turning, None, (), steps, product, holds=placed.holds)
+            return Cut(surface, key, jumps, turning, None, (), steps, product, holds=placed.holds, bends=placed.bends)
         roots.update(dict.fromkeys((*found.roots, *found.poles)))
         families.update(dict.fromkeys((*found.families, *found.pole_families)))
-    return Cut(surface, key, jumps, turning, tuple(roots), tuple(families), steps, product, holds=placed.holds)
+    sections = tuple(roots), tuple(families)
+    return Cut(surface, key, jumps, turning, *sections, steps, product, holds=placed.holds, bends=placed.bends)
 
 
 def _roots(part: WrittenSurface, variable: str) -> Sections | None:

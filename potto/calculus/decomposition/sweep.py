@@ -9,14 +9,16 @@ decomposition in the manner of Collins, of the surfaces that a scene has, and of
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import partial
 
 from msgspec import Struct
 from msgspec.structs import replace
 
 from potto.calculus.algebra.rational_form import settled
-from potto.calculus.decomposition.circular_regions import circular_region
+from potto.calculus.decomposition.circular_regions import Polynomial, circular_region
 from potto.calculus.decomposition.critical import Critical, Within
 from potto.calculus.decomposition.projection import crossing, further_systems, shadows_of_cuts, shadows_of_roots
+from potto.calculus.decomposition.side_polynomials import by_sides
 from potto.calculus.decomposition.surface_cuts import (
     MOST_CENTERS,
     CircularRegion,
@@ -78,9 +80,12 @@ class _Pool(Struct):
         elif finding.kind != "step":  # no variable takes part in it
             surface = settled(finding.surface, frozenset(self.variables))
             jump = (finding.path, finding.strict) if finding.kind == "jump" else None
-            self.put(surface, jump, finding.kind == "edge")
+            self.put(surface, jump, finding.kind == "edge", bends=finding.kind != "jump")
 
-    def put(self, surface: Term, jump: tuple[tuple[int, ...], bool] | None, turning: bool, steps: bool = False) -> None:
+    def put(
+        self, surface: Term, jump: tuple[tuple[int, ...], bool] | None, turning: bool, steps: bool = False,
+        bends: bool = False,
+    ) -> None:  # fmt: skip
         face, orientation = face_of(surface)
         if not face.key.free:
             return
@@ -91,6 +96,7 @@ class _Pool(Struct):
             placed.jumps.append(Jump(jump[0], orientation, jump[1]))
         placed.turning |= turning
         placed.steps |= steps
+        placed.bends |= bends
 
     def hold(self, holds: Holds) -> None:
         """Note the sides outside of which nothing is integrated."""
@@ -153,13 +159,15 @@ def sweep(
     pool = _Pool(term.variables)
     for finding in found:
         pool.find(finding)
+    polynomial = None
     if holds is not None and over is None:
         pool.hold(holds)
+        polynomial = partial(by_sides, term.body, resolve=resolve)
     levels: list[Level] = []
     rows = list(zip(term.variables, term.bounds, term.hints, strict=True))
     for variable, bounds, hints in reversed(rows):
         last = outermost and variable == term.variables[0]
-        levels.append(_level(pool, variable, bounds, hints, over if not levels else None, last))
+        levels.append(_level(pool, variable, bounds, hints, over if not levels else None, last, polynomial))
         for bound in bounds:
             for finding in findings(bound, resolve, decide):
                 if finding.kind == "jump":
@@ -170,14 +178,16 @@ def sweep(
 
 
 def _level(
-    pool: _Pool, variable: str, bounds: tuple[Term, Term], hints: tuple[Term, ...], over: LevelSet | None, last: bool
-) -> Level:
-    """One variable with what cuts it; what that leaves further out goes into the pool, unless nobody asks for it."""
+    pool: _Pool, variable: str, bounds: tuple[Term, Term], hints: tuple[Term, ...], over: LevelSet | None, last: bool,
+    polynomial: Polynomial | None,
+) -> Level:  # fmt: skip
+    """One variable with what cuts it; what that leaves further out goes into the pool, unless nobody asks for it.
+    polynomial: gives the integrand in the sides of surfaces."""
     cuts = tuple(cut_of(placed, variable) for placed in pool.take(variable))
     decisive, others = [c for c in cuts if c.decides], [c for c in cuts if not c.decides]
     further = frozenset(pool.variables[: pool.variables.index(variable)])
     within = Within(variable, *bounds)
-    region, (lines, circles) = circular_region(decisive, within, further)
+    region, (lines, circles) = circular_region(decisive, within, further, polynomial)
     alone = [cut for cut in decisive if cut not in lines and cut not in circles]
     complete = len(others) <= MOST_CUTS and crossing((*alone, *others), variable, further)[1]
     cuts = (*decisive, *others[:MOST_CUTS])

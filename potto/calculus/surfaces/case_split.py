@@ -42,7 +42,7 @@ def cased(term: Integral) -> Integral:
 
 
 def by_extremes(term: Integral) -> Integral:
-    """The same with a condition on a greatest or a least as one on each of them, where that is an `and`."""
+    """The same with a condition on a greatest or a least as one on each of them."""
     return _changed(term, lambda node: _settled(node, MOST))
 
 
@@ -124,9 +124,7 @@ def _settled(node: Term, most: int) -> Term:
         rises = _direction(surface, part) if part.op in _EXTREME else 0
         if rises and isinstance(extreme, Prim) and extreme.op in ("max", "min"):
             every = (extreme.op == "max") == (rises < 0)
-            # Of an `or` the one surface with a kink takes less than two, unless one of the two is a number.
-            if every or not all(arg.free for arg in extreme.args):
-                return _one_by_one(node, part, extreme.args, every, most)
+            return _one_by_one(node, part, extreme.args, every, most)
     return _apart(node, most) if _changes(node) else node
 
 

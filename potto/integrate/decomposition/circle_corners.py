@@ -1,7 +1,8 @@
 """Crossings of circles with each other and with lines, as far as they may be corners of a region.
 
-Owns `circle_corners`, and `moving`, how they move. Two circles cross on a line, their radical axis. A crossing counts
-unless it lies outside of one of the other lines and circles for certain.
+Owns `circle_corners`, `mixed_corners` and `moving`, how they move. Two circles cross on a line, their radical axis. In
+an intersection a crossing counts unless it lies outside of one of the other lines and circles for certain; in what is
+made of unions as well, wherever what both bound is not 0 on the sides of the others where it lies.
 """
 
 from __future__ import annotations
@@ -11,6 +12,9 @@ from typing import Any
 
 import numpy as np
 
+from potto.calculus.decomposition.side_polynomials import LEAST, MOST
+from potto.calculus.decomposition.surface_cuts import side
+from potto.core.terms import Lam
 from potto.integrate.decomposition.meetings import as_array, tangents
 from potto.integrate.levels import Corners
 from potto.integrate.pieces import gather
@@ -20,6 +24,9 @@ from potto.kernels.cells import Array, Bools, Cell, Ints, Value, pad
 BESIDE = 2.0**-24  # of its size: how far outside of a region a place still counts
 CLEAR = 16 * EPS  # of the sizes of its summands: how far off what tells that is
 TOUCHING = 2.0**-20  # the sine of the angle below which lines and circles touch rather than cross
+MOST_NEAR = 20  # lines and circles at a crossing: the least of products of their sides is still told from rounding
+CANCELLED = 2.0**-40  # of its summands: what a mixed difference is at most where it is 0
+MOST_NUMBERS = 1 << 18  # that are looked at at once
 STEPS = 2  # of Newton's method, from a place that has half of its digits or more
 
 
@@ -42,6 +49,64 @@ def circle_corners(lines: Sequence[Array], circles: Sequence[Array]) -> tuple[In
             some = np.nonzero(there)[0]
             there[some] = _holds(v[:, number, owner[some]], e[:, number, owner[some]], place[:, some], off[some])
     return p[there], q[there], owner[there], place[:, there], off[there]
+
+
+def mixed_corners(
+    lines: Sequence[Array], circles: Sequence[Array], polynomial: Lam, machine: Any
+) -> tuple[Ints, Ints, Ints, Array, Array]:
+    """The same where an integrand is a polynomial in the sides of all, also of which two lines cross."""
+    with np.errstate(all="ignore"):
+        v, e = (_joined(of, more) for of, more in zip(lines, circles, strict=True))
+        _, count, batch = v.shape
+        p, q = (np.repeat(of, batch) for of in np.triu_indices(count, 1))
+        owner = np.tile(np.arange(batch), p.size // batch)
+        round_too = p < circles[0].shape[1]
+        parts = [_crossings(v, e, p[round_too], q[round_too], owner[round_too]),
+                 _straight_crossings(v, e, p[~round_too], q[~round_too], owner[~round_too])]  # fmt: skip
+        place, off = (np.concatenate(of, axis=-1) for of in zip(*parts, strict=True))
+        p, q, owner = (np.concatenate((of[round_too], of[round_too], of[~round_too])) for of in (p, q, owner))
+        some = np.nonzero(np.isfinite(place).all(axis=0))[0]
+        each = max(1, MOST_NUMBERS // count)
+        chunks = [some[i : i + each] for i in range(0, some.size, each)]
+        kept = [c[_bounds_both(v, e, p[c], q[c], owner[c], place[:, c], off[c], polynomial, machine)] for c in chunks]
+        there = np.concatenate((*kept, some[:0]))
+    return p[there], q[there], owner[there], place[:, there], off[there]
+
+
+def _bounds_both(
+    v: Array, e: Array, p: Ints, q: Ints, owner: Ints, place: Array, off: Array, polynomial: Lam, machine: Any
+) -> Bools:
+    """Whether there may be something at places that both surfaces p and q bound."""
+    over, under = ([_holds(sign * v[:, n, owner], e[:, n, owner], place, off) for n in range(v.shape[1])]
+                   for sign in (1.0, -1.0))  # fmt: skip
+    above: Bools = np.stack(over)
+    near, at = above & np.stack(under), np.arange(p.size)
+    near[p, at] = near[q, at] = False
+    drawn = np.random.default_rng(0).uniform(LEAST, MOST, (v.shape[1], 1))
+    sides = np.where(near, drawn, np.where(above, 1.0, 0.0))
+    corners = []
+    for first, second in ((1.0, 1.0), (1.0, 0.0), (0.0, 1.0), (0.0, 0.0)):
+        sides[p, at], sides[q, at] = first, second
+        env = {name: Cell(sides[n]) for n in range(v.shape[1]) if (name := side(n)) in polynomial.params}
+        corners.append(as_array(machine.with_directions(0).evaluate(polynomial, env, None).v, p.size))
+    one, other, third, none = corners
+    mixed = np.abs(one - other - third + none)
+    still = mixed <= CANCELLED * np.abs(np.stack(corners)).max(axis=0)
+    found: Bools = ~still | (near.sum(axis=0) > MOST_NEAR)
+    return found
+
+
+def _straight_crossings(v: Array, e: Array, p: Ints, q: Ints, owner: Ints) -> tuple[Array, Array]:
+    """Where lines cross, (2, P), and how far off that is, (P,)."""
+    (_, a, b, c), (_, d, f, g) = v[:, p, owner], v[:, q, owner]
+    (_, ea, eb, ec), (_, ed, ef, eg) = e[:, p, owner], e[:, q, owner]
+    below = a * f - b * d
+    place = np.stack((b * g - c * f, c * d - a * g)) / below
+    x, y = np.abs(place)
+    first = ea * x + eb * y + ec + CLEAR * (np.abs(a) * x + np.abs(b) * y + np.abs(c))
+    second = ed * x + ef * y + eg + CLEAR * (np.abs(d) * x + np.abs(f) * y + np.abs(g))
+    off = (first * (np.abs(d) + np.abs(f)) + second * (np.abs(a) + np.abs(b))) / np.abs(below)
+    return place, off
 
 
 def _joined(lines: Array, circles: Array) -> Array:

@@ -1,9 +1,9 @@
 """The corners of regions of half planes and discs, and the edges of a range that is an intersection of such.
 
-Owns `corner_rows` and `within_walls`. What is integrated is 0 outside of such a region, so that lines and circles that
-cross there leave nothing: of n^2/2 crossings the corners count alone. Each line is clipped by all others (Cyrus and
-Beck 1978), which takes n^2 sums and products, and no formula; where a circle takes part, crossings are held against all
-the others (`circle_corners`). Whatever rounding does not settle counts.
+Owns `corner_rows` and `within_walls`. What is integrated is 0 outside of an intersection, so that lines and circles
+that cross there leave nothing: of n^2/2 crossings the corners count alone. Each line is clipped by all others (Cyrus
+and Beck 1978), which takes n^2 sums and products, and no formula; where a circle takes part, or a union, crossings are
+held against all the others (`circle_corners`). Whatever rounding does not settle counts.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ import numpy as np
 from msgspec import Struct
 from msgspec.structs import replace
 
-from potto.core.terms import Term
+from potto.core.terms import Lam, Term
 from potto.integrate.columns import distinct, side_by_side
-from potto.integrate.decomposition.circle_corners import BESIDE, CLEAR, circle_corners, moving
+from potto.integrate.decomposition.circle_corners import BESIDE, CLEAR, circle_corners, mixed_corners, moving
 from potto.integrate.decomposition.meetings import Row, as_array, tangents
 from potto.integrate.events import Unsearched
 from potto.integrate.levels import LevelPlan
@@ -103,11 +103,10 @@ def corner_rows(level: LevelPlan, env: dict[str, Value], batch: int, machine: An
         if unknown.any():
             machine.note(Unsearched(level.variable), np.nonzero(unknown)[0])
         lines = _Lines(*(_apart(of[..., : 3 * region.lines, :], 3) for of in numbers)).in_order()
-        first, second, owner = _corners(lines)
-        found = [(owner, *lines.crossings(first, second, owner))]
-        if numbers[0].shape[0] > 3 * region.lines:
-            circles, doubt = (_apart(of[..., 3 * region.lines :, :], 4) for of in numbers[:2])
-            pairs = circle_corners((lines.v, lines.e), (circles, doubt))
+        circles = tuple(_apart(of[..., 3 * region.lines :, :], 4) for of in numbers[:2])
+        straight, pairs = _crossing(lines, circles, region.polynomial, machine)
+        found = [(straight[2], *lines.crossings(*straight))]
+        if circles[0].size:
             found.append(moving(region, level.variable, env, *pairs, machine))
         owner, x, e, t, et = (np.concatenate(of, axis=-1) for of in zip(*found, strict=True))
         order = np.lexsort((x, owner))
@@ -115,6 +114,24 @@ def corner_rows(level: LevelPlan, env: dict[str, Value], batch: int, machine: An
                        for of, gap in ((x, np.nan), (e, 0.0), (t, 0.0), (et, 0.0)))  # fmt: skip
         rows += [Row(x[i], tuple(t[:, i]), region.cut, False, e[i], tuple(et[:, i])) for i in range(x.shape[0])]
     return rows
+
+
+def _crossing(
+    lines: _Lines, circles: Sequence[Array], polynomial: Lam | None, machine: Any
+) -> tuple[tuple[Ints, Ints, Ints], tuple[Ints, Ints, Ints, Array, Array]]:
+    """Which two lines cross where there may be a corner, and of which member; and where circles take part."""
+    if polynomial is None:
+        return _corners(lines), circle_corners((lines.v, lines.e), circles)
+    p, q, owner, place, off = mixed_corners((lines.v, lines.e), circles, polynomial, machine)
+    first = circles[0].shape[1]
+    flat = p >= first
+    return (p[flat] - first, q[flat] - first, owner[flat]), (
+        p[~flat],
+        q[~flat],
+        owner[~flat],
+        place[:, ~flat],
+        off[~flat],
+    )
 
 
 def _numbers(values: Value, batch: int, directions: int) -> tuple[Array, Array, Array, Array]:
