@@ -29,6 +29,7 @@ class LevelPlan(Struct, frozen=True, dict=True):
     walls: rows of the frame, bounds not counted, beyond which nothing is integrated, on the side that the signs of
     `slopes` tell: above those with a slope below 0, below the others. Two roots of a surface are a wall on either side,
     where its square has a coefficient below 0.
+    covers: the same of surfaces on one side of which no row of `covered` matters, and whose own those are.
     """
 
     level: Level
@@ -42,6 +43,9 @@ class LevelPlan(Struct, frozen=True, dict=True):
     corners: tuple[Corners, ...] = ()
     walls: tuple[tuple[int, ...], ...] = ()
     slopes: Lam = NOTHING
+    covers: tuple[tuple[int, ...], ...] = ()
+    covering: Lam = NOTHING
+    covered: tuple[int, ...] = ()
 
     @property
     def variable(self) -> str:
@@ -136,6 +140,7 @@ def level_plan(level: Level, decided: tuple[int, ...], groups: Sequence[Group]) 
         turned,
         corners,
         *_walls(level, rows),
+        *_covers(level, rows),
     )
 
 
@@ -148,18 +153,33 @@ def _corners(cut: int, region: CircularRegion) -> Corners:
 
 def _walls(level: Level, rows: Sequence[tuple[int, bool]]) -> tuple[tuple[tuple[int, ...], ...], Lam]:
     """The rows beyond which nothing is integrated, and what tells on which side of them something is."""
+    walls, slopes = _ends(level, rows, [cut.holds for cut in level.cuts])
+    return (walls, slopes) if len(walls) >= MANY_WALLS else ((), NOTHING)
+
+
+def _covers(level: Level, rows: Sequence[tuple[int, bool]]) -> tuple[tuple[tuple[int, ...], ...], Lam, tuple[int, ...]]:
+    """The rows between which, or beyond which, others don't matter, what tells on which side, and those others."""
+    covers, slopes = _ends(level, rows, [cut.covers or 0 for cut in level.cuts])
+    return covers, slopes, tuple(row for row, (n, _) in enumerate(rows) if n >= 0 and level.cuts[n].covers is not None)
+
+
+def _ends(
+    level: Level, rows: Sequence[tuple[int, bool]], sides: Sequence[int]
+) -> tuple[tuple[tuple[int, ...], ...], Lam]:
+    """The one or two rows of each cut that has a side, 1 or -1, and the coefficients of its highest power as it is
+    positive there."""
     own: dict[int, list[int]] = {}
     for row, (number, _) in enumerate(rows):
         own.setdefault(number, []).append(row)
-    walls: list[tuple[int, ...]] = []
+    ends: list[tuple[int, ...]] = []
     slopes: list[Term] = []
-    for number, cut in enumerate(level.cuts):
-        if cut.holds and cut.product is None and not cut.families and 1 <= len(own.get(number, ())) <= 2:
+    for number, (cut, side) in enumerate(zip(level.cuts, sides, strict=True)):
+        if side and cut.product is None and not cut.families and 1 <= len(own.get(number, ())) <= 2:
             found = polynomial(cut.surface, level.variable)
             if found is not None and len(found) == 1 + len(own[number]):
-                walls.append(tuple(own[number]))
-                slopes.append(found[0] if cut.holds > 0 else neg(found[0]))
-    return (tuple(walls), function_of(tuple_(tuple(slopes)))) if len(walls) >= MANY_WALLS else ((), NOTHING)
+                ends.append(tuple(own[number]))
+                slopes.append(found[0] if side > 0 else neg(found[0]))
+    return tuple(ends), function_of(tuple_(tuple(slopes)))
 
 
 def _deciding(

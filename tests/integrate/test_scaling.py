@@ -63,6 +63,19 @@ def discs(n: int) -> tuple[str, dict[str, float]]:
     return f"def f(t) integral ([-2, 2], [-2, 2]) {sides} d(x, y)", {"t": 0.9}
 
 
+def union(n: int) -> tuple[str, dict[str, float]]:
+    """What discs around a middle cover."""
+    discs = (f"(x - ({0.3 * math.cos(a)!r}))^2 + (y - ({0.3 * math.sin(a)!r}))^2 < t^2"
+             for a in (2 * math.pi * (k + 0.3) / n for k in range(n)))  # fmt: skip
+    return f"def f(t) integral ([-2, 2], [-2, 2]) [{' or '.join(discs)}] d(x, y)", {"t": 0.9}
+
+
+def chain(n: int) -> tuple[str, dict[str, float]]:
+    """Discs that overlap with their neighbours alone, as the greatest of functions."""
+    discs = (f"t^2 - (x - {(k + 0.5) / n!r})^2 - (y - {0.5 + 0.2 * math.sin(7 * (k + 0.5) / n)!r})^2" for k in range(n))
+    return f"def f(t) integral ([0, 1], [0, 1]) [max({', '.join(discs)}) > 0] d(x, y)", {"t": 0.8 / n}
+
+
 def builtins(n: int) -> tuple[str, dict[str, float]]:
     terms = " + ".join(f"sin({k}/{n}*x*t)*exp(-{k}/{n}*x)" for k in range(1, n + 1))
     return f"def f(t) integral [0, 1] ({terms})*[x < t] d(x)", {"t": 0.7}
@@ -76,6 +89,7 @@ def counted(call: Callable[[], Any]) -> tuple[int, int]:
 @pytest.mark.parametrize("made, sizes", [
     (conditions, (20, 40, 80)), (one_parameter, (160, 320, 640)), (own_parameters, (40, 80, 160)),
     (triangles, (12, 24, 48)), (polygon, (16, 32, 64)), (discs, (24, 48, 96)),
+    (union, (10, 20, 40, 80)), (chain, (10, 20, 40, 80)),
     (builtins, (80, 160, 320)),  # below, fewer nodes do
 ])  # fmt: skip
 @pytest.mark.parametrize("gradient", [False, True])

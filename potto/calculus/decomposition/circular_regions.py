@@ -14,32 +14,34 @@ from potto.calculus.algebra.affine import affine
 from potto.calculus.algebra.polynomial_in import collect
 from potto.calculus.algebra.rational_form import is_zero, shorter
 from potto.calculus.decomposition.critical import Within
-from potto.calculus.decomposition.side_polynomials import Sides
+from potto.calculus.decomposition.side_polynomials import Sides, settling
 from potto.calculus.decomposition.surface_cuts import CircularRegion, Cut, side
 from potto.core.terms import ONE, ZERO, Term, mul, neg, sub, var
 
 LEAST = 6  # the crossings of fewer are rows of plans that need no search
 Polynomial = Callable[[Sides], Term | None]
 Edges = tuple[list[Cut], list[Cut]]
+Covers = dict[Cut, int]  # what they have as `covers`
 
 
 def circular_region(
     cuts: Sequence[Cut], within: Within, further: frozenset[str], polynomial: Polynomial | None
-) -> tuple[CircularRegion | None, Edges]:
+) -> tuple[CircularRegion | None, Edges, Covers]:
     """The region that half planes and discs of a variable and the outermost one bound, with the lines and the circles
-    among the cuts; None and no cuts where there are few, or other variables further out. polynomial: gives the
-    integrand in the sides of surfaces. Where that can't be told, those cuts count of which one side has to hold."""
+    among the cuts, and which of them cover others; None and no cuts where there are few, or other variables further
+    out. polynomial: gives the integrand in the sides of surfaces. Where that can't be told, those cuts count of which
+    one side has to hold."""
     if len(further) != 1 or (within.lo.free | within.hi.free) & further:
-        return None, ([], [])
+        return None, ([], []), {}
     names = (*further, within.variable)
     flat = [cut for cut in cuts if cut.product is None and (cut.holds or not (cut.bends or cut.steps))]
     some = _region(flat, within, names, polynomial) if polynomial is not None else None
-    return some or _region([cut for cut in flat if cut.holds], within, names, None) or (None, ([], []))
+    return some or _region([cut for cut in flat if cut.holds], within, names, None) or (None, ([], []), {})
 
 
 def _region(
     cuts: Sequence[Cut], within: Within, names: Sequence[str], polynomial: Polynomial | None
-) -> tuple[CircularRegion, Edges] | None:
+) -> tuple[CircularRegion, Edges, Covers] | None:
     lines: dict[Cut, tuple[Term, ...]] = {}
     circles: dict[Cut, tuple[Term, ...]] = {}
     for cut in cuts:
@@ -51,17 +53,19 @@ def _region(
     if len(edges) < LEAST:
         return None
     bounds = (ZERO, ONE, neg(within.lo)), (ZERO, neg(ONE), within.hi)
-    y, by_sides = var(within.variable), None
+    y, by_sides, covers = var(within.variable), None, dict[Cut, int]()
     if all(cut.holds for cut in edges):
         lines, circles = ({cut: _turned(cut, of[cut]) for cut in of} for of in (lines, circles))
     else:
         sides = {jump.path: (side(n), jump.orientation) for n, cut in enumerate(edges) for jump in cut.jumps}
         if polynomial is None or (by_sides := polynomial(sides)) is None:
             return None
+        settled = settling(by_sides, [side(n) for n in range(len(edges))])
+        covers = {cut: settled.get(side(n), 0) for n, cut in enumerate(edges)} if settled else {}
         by_sides = mul(by_sides, *(var(side(len(edges) + n)) for n in range(2)))
     surfaces = (*(cut.surface for cut in edges), sub(y, within.lo), sub(y, within.hi))
     region = CircularRegion((*lines.values(), *bounds), tuple(circles.values()), within.variable, surfaces, by_sides)
-    return region, (list(lines), list(circles))
+    return region, (list(lines), list(circles)), covers
 
 
 def circle(surface: Term, x: str, y: str) -> tuple[Term, Term, Term, Term] | None:

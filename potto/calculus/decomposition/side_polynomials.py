@@ -1,18 +1,19 @@
 """Integrands as polynomials in the sides of their surfaces, from which it shows where a crossing of two matters.
 
-Owns `by_sides`. A branch on a surface is s*then + (1 - s)*orelse with a side s of 0 or 1, so that an integrand is a
-polynomial in sides, of degree 1 in each, whose coefficients are smooth. The mixed difference by two sides is 0 where
-what is integrated has no part that both bound: their crossing leaves nothing that is not smooth. Of all `or`, `and`,
-sums and products that is the one rule; quotients and powers are no polynomials, but it holds of them as well. What is
-smooth is a number drawn at random here, as any other side is: a polynomial that is 0 there is 0 everywhere, but by
-chance (Schwartz 1980, Zippel 1979).
+Owns `by_sides`, and `settling`, which sides leave nothing to the others. A branch on a surface is
+s*then + (1 - s)*orelse with a side s of 0 or 1, so that an integrand is a polynomial in sides, of degree 1 in each,
+whose coefficients are smooth. The mixed difference by two sides is 0 where what is integrated has no part that both
+bound: their crossing leaves nothing that is not smooth. Of all `or`, `and`, sums and products that is the one rule;
+quotients and powers are no polynomials, but it holds of them as well. What is smooth is a number drawn at random here,
+as any other side is: a polynomial that is 0 there is 0 everywhere, but by chance (Schwartz 1980, Zippel 1979).
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from hashlib import blake2b
 
+from potto.calculus.algebra.point_values import sample_value
 from potto.calculus.inlining.currying import arguments_of, sizes_of, uncurry
 from potto.calculus.surfaces.discontinuities import Resolve
 from potto.calculus.surfaces.trace import layout, spine
@@ -56,6 +57,19 @@ def by_sides(body: Term, sides: Sides, resolve: Resolve) -> Term | None:
         return None
     found = _parts(body, sides, {}, resolve)[body]
     return None if found is None else _one(found)
+
+
+def settling(polynomial: Term, names: Sequence[str]) -> dict[str, int]:
+    """The sides that leave nothing to the others, as that of a disc in a union: 1 or -1. What is drawn is larger than 1
+    here, as 1 less than it is, so that no product of many hides the rest."""
+    points = [{name: 1.0 + _number(name.encode() + which) for name in names} for which in (b"one", b"other")]
+    found: dict[str, int] = {}
+    for name in names:
+        for way, value in ((1, 1.0), (-1, 0.0)):
+            one, other = (sample_value(polynomial, {**point, name: value}) for point in points)
+            if one == other:
+                found[name] = way
+    return found
 
 
 def _one(term: Term) -> Term:
@@ -142,5 +156,8 @@ def _called(call: App, memo: Mapping[Term, Term | None], site: int, sides: Sides
 
 def _drawn(term: Term, what: str) -> Term:
     """A number for a term, the same one whenever it is asked for."""
-    digest = blake2b(term.digest + what.encode(), digest_size=4).digest()
-    return const(LEAST + (MOST - LEAST) * int.from_bytes(digest) / 2**32)
+    return const(_number(term.digest + what.encode()))
+
+
+def _number(content: bytes) -> float:
+    return LEAST + (MOST - LEAST) * int.from_bytes(blake2b(content, digest_size=4).digest()) / 2**32

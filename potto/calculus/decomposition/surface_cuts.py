@@ -50,6 +50,8 @@ class Cut(Struct, frozen=True):
     center: nothing happens at it but that a smooth integrand may be concentrated there.
     holds: 1 or -1 where nothing is integrated but on that side of the canonical form, else 0.
     bends: the integrand bends there as well, or is defined on one side alone, whatever its branches do.
+    covers: 1 or -1 where on that side of the canonical form nothing jumps at any cut that has this, 0 for one that is
+        but covered by others.
     corners: the region whose corners it stands for, instead of a surface.
     """
 
@@ -64,6 +66,7 @@ class Cut(Struct, frozen=True):
     center: bool = False
     holds: int = 0
     bends: bool = False
+    covers: int | None = None
     corners: CircularRegion | None = None
 
     @property

@@ -187,7 +187,7 @@ def _level(
     decisive, others = [c for c in cuts if c.decides], [c for c in cuts if not c.decides]
     further = frozenset(pool.variables[: pool.variables.index(variable)])
     within = Within(variable, *bounds)
-    region, (lines, circles) = circular_region(decisive, within, further, polynomial)
+    region, (lines, circles), covers = circular_region(decisive, within, further, polynomial)
     alone = [cut for cut in decisive if cut not in lines and cut not in circles]
     complete = len(others) <= MOST_CUTS and crossing((*alone, *others), variable, further)[1]
     cuts = (*decisive, *others[:MOST_CUTS])
@@ -209,6 +209,7 @@ def _level(
         cuts = (*cuts, *(Cut(ZERO, ZERO, (), False, (), corners=corners) for corners in pool.corners))
     if region is not None:
         pool.corners.append(region)
+        cuts = tuple(replace(cut, covers=covers[cut]) if cut in covers else cut for cut in cuts)
     peaks = (*hints, *points_of(here, variable)[:MOST_CENTERS])
     placed = (*cuts, *around_centers(here, variable)) if own is None else (own,)
     return Level(variable, *bounds, peaks, placed, systems, complete, edges)

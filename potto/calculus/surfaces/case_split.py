@@ -42,7 +42,7 @@ def cased(term: Integral) -> Integral:
 
 
 def by_extremes(term: Integral) -> Integral:
-    """The same with a condition on a greatest or a least as one on each of them."""
+    """The same with a condition on a greatest or a least as one on each of them; on abs where that is an `and`."""
     return _changed(term, lambda node: _settled(node, MOST))
 
 
@@ -124,7 +124,9 @@ def _settled(node: Term, most: int) -> Term:
         rises = _direction(surface, part) if part.op in _EXTREME else 0
         if rises and isinstance(extreme, Prim) and extreme.op in ("max", "min"):
             every = (extreme.op == "max") == (rises < 0)
-            return _one_by_one(node, part, extreme.args, every, most)
+            # abs(u) > t stays one surface: that it folds at t = 0 tells its one-sided derivatives exactly.
+            if every or written is None or not all(arg.free for arg in extreme.args):
+                return _one_by_one(node, part, extreme.args, every, most)
     return _apart(node, most) if _changes(node) else node
 
 

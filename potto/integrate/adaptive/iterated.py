@@ -15,6 +15,7 @@ from potto.integrate.adaptive.refining import integrated
 from potto.integrate.adaptive.root_sums import Rows, over_roots
 from potto.integrate.columns import distinct
 from potto.integrate.decomposition.corners import corner_rows, within_walls
+from potto.integrate.decomposition.covered import uncovered
 from potto.integrate.decomposition.critical_places import critical_rows
 from potto.integrate.decomposition.cuts import Cuts, at_rest, finite_speeds, frame_rows, on_bounds, segments, standing
 from potto.integrate.decomposition.effective_range import concentrated, pulled_in
@@ -212,8 +213,11 @@ class Iteration(Struct):
         values = machine.tracking().evaluate(level.frame, env, None)
         assert isinstance(values, tuple)
         lo, hi, rows = frame_rows(level, values)
+        face = None if self.face is None else self.face.surface
         if level.walls:
-            rows = within_walls(level, rows, env, batch, machine, None if self.face is None else self.face.surface)
+            rows = within_walls(level, rows, env, batch, machine, face)
+        if level.covers:
+            rows = uncovered(level, rows, env, batch, machine, face)
         corners = corner_rows(level, env, batch, machine) if level.corners else []
         found, lost = self.searched(level, env, lo, hi, batch, machine)
         return lo, hi, rows + corners + found, lost
