@@ -126,6 +126,7 @@ def level_plan(level: Level, decided: tuple[int, ...], groups: Sequence[Group]) 
     for kind, places in ((HINT, level.hints), (RESTING, level.edges)):
         terms.extend(places)
         rows.extend((kind, False) for _ in places)
+    covers, covering, covered = _covers(level, rows)
     deciding, turned = _deciding(decided, groups)
     surfaces = function_of(tuple_(deciding))
     corners = tuple(_corners(number, cut.corners) for number, cut in enumerate(level.cuts) if cut.corners)
@@ -140,7 +141,9 @@ def level_plan(level: Level, decided: tuple[int, ...], groups: Sequence[Group]) 
         turned,
         corners,
         *_walls(level, rows),
-        *_covers(level, rows),
+        covers=covers,
+        covering=covering,
+        covered=covered,
     )
 
 
