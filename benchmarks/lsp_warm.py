@@ -42,7 +42,7 @@ class Session:
         self.check(set())
         self.analysis.settled = True
         self.analysis.forget_trees()
-        memory.settle()
+        memory.begin_collecting()
 
     def put(self, name: str, text: str) -> None:
         self.version += 1
@@ -70,8 +70,9 @@ class Session:
     def edit(self, name: str, text: str, wanted: set[str]) -> Times:
         start = time.thread_time()
         self.put(name, text)
-        told = self.check(wanted)
-        return (told - start) * 1e3, (time.thread_time() - start) * 1e3
+        told, done = self.check(wanted), time.thread_time()
+        memory.tidy()  # as the server does while nobody waits
+        return (told - start) * 1e3, (done - start) * 1e3
 
 
 def show(what: str, edits: Callable[[int], Times]) -> None:

@@ -155,6 +155,7 @@ class ClientSession:
         self.analysis.prepare(key)
         self.analysis.prepare_users(key)
         self.to_prepare.discard(key)
+        memory.tidy()
 
     def _keep(self, key: str) -> None:
         self.to_keep.discard(key)
