@@ -26,6 +26,7 @@ from potto.integrate.adaptive.refinement import (
     too_coarse,
 )
 from potto.integrate.adaptive.reynolds import Totals, sums, totals
+from potto.integrate.adaptive.seams import at_seams
 from potto.integrate.adaptive.short_neighbours import unseen
 from potto.integrate.adaptive.tails import paced
 from potto.integrate.columns import distinct
@@ -77,7 +78,7 @@ def integrated(work: PanelBatch) -> Sums:
     work.endless = endless(work, found)
     tally = Tally(work, fresh)
     work.filled = filled(work, fresh)
-    done = refine(work, fresh, ends, tally)
+    done = at_seams(work, refine(work, fresh, ends, tally))
     for _ in range(DOUBTFUL_ROUNDS):
         found = totals(work, done, ends)
         bad = doubtful(work, done, found)
@@ -85,7 +86,7 @@ def integrated(work: PanelBatch) -> Sums:
             break
         halves = halved(done.pick(bad))
         halves = replaced(work, done.pick(bad), halves, HALF_ORDER, tally)
-        done = done.pick(~bad).join(refine(work, halves, ends, tally))
+        done = at_seams(work, done.pick(~bad).join(refine(work, halves, ends, tally)))
     else:
         found = totals(work, done, ends)
     return given_up(work, done, found, sums(work, found, ends))

@@ -72,6 +72,8 @@ class PanelBatch(Struct, dict=True):
         with np.errstate(divide="ignore", invalid="ignore"):
             off = np.maximum(self.seg.ea, self.seg.eb) / (self.seg.b - self.seg.a)
         self.hinted = any(level.peaks for level in self.parent.plan.levels[self.number :])
+        # Whether places are not known at which sections further in cross.
+        self.blind = not all(level.level.complete for level in self.parent.plan.levels[self.number + 1 :])
         self.bends = not self.last and bool((off > UNSURE).any())  # beside cuts, by more than nothing
 
     # Channels: per component the value, then per direction the moving form, then (if both) the fixed form
@@ -154,6 +156,8 @@ class PanelBatch(Struct, dict=True):
             p.tail = size[::stride, :, -2:].sum(axis=-1)
         else:
             p.most = p.ends = p.tail = np.empty((0, p.u0.size))
+        ends = np.moveaxis(coefficients @ rule.ends, -1, 0) if self.blind else np.empty((0, p.u0.size))
+        p.led = ends.reshape(-1, p.u0.size)
         p.floor = 4 * EPS * p.size + (size @ rule.slopes) * shake
         if self.ends is not None and self.last and not self.parent.tracked:
             p.floor += noise(self.ends, self.width, p, seg)
