@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +10,9 @@ import numpy as np
 import pytest
 
 import potto
+from potto.calculus.inlining import expand
+from potto.calculus.surfaces.discontinuities import ends_of_domain
+from potto.core.terms import Term, rebuild
 from potto.integrate import plan
 from potto.integrate.outline import Outline, outlined
 from potto.kernels import compile as kernels
@@ -50,6 +54,34 @@ def test_swapping_a_shader_compiles_the_shader_alone(tmp_path: Path) -> None:
     assert compiled(ws, tmp_path, SECOND) == 1
     assert compiled(ws, tmp_path, FIRST) == 0
     assert compiled(ws, tmp_path, SECOND) == 0
+
+
+def swapped_under(conditions: int, looked_at: Callable[[], int]) -> int:
+    """How much more was looked at when a second shader took the place of a first one under so many conditions."""
+    steps = " + ".join(f"[x < {k}/{conditions + 1}*t]" for k in range(1, conditions + 1))
+    m = potto.compile(f"def f(t, shader) integral [0, 1] shader x*({steps}) d(x)\na = \\x . 1 + x\nb = \\x . 2 + x*x")
+    with potto.settings(backend="numpy"):
+        m.f(0.9, m.a)
+        before = looked_at()
+        found = m.f(0.9, m.b)
+    at = 0.9 * np.arange(1, conditions + 1) / (conditions + 1)
+    assert abs(found.value - (2 * at + at**3 / 3).sum()) < 1e-14 * conditions  # sums of numbers up to 2, in doubles
+    return looked_at() - before
+
+
+def test_where_surfaces_are_defined_is_found_once_for_all_shaders() -> None:
+    assert swapped_under(23, lambda: ends_of_domain.cache_info().misses) == 0
+
+
+def test_what_holds_no_call_is_not_rebuilt_for_another_shader(monkeypatch: pytest.MonkeyPatch) -> None:
+    rebuilt: list[Term] = []
+
+    def counted(node: Term, parts: tuple[Term, ...]) -> Term:
+        rebuilt.append(node)
+        return rebuild(node, parts)
+
+    monkeypatch.setattr(expand, "rebuild", counted)
+    assert 0 < swapped_under(44, lambda: len(rebuilt)) <= 4  # the call and the product that it stands in, at each look
 
 
 def test_a_separately_compiled_renderer_gives_the_same_as_one_written_out(tmp_path: Path) -> None:

@@ -1,6 +1,6 @@
 """Calls carried out: a term in which known functions are replaced by what they do.
 
-Owns `expanded`, `Expansion`, `Calls`, `known_function`, `named` and `heads_of`.
+Owns `expanded`, `holds_call`, `Expansion`, `Calls`, `known_function`, `named` and `heads_of`.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from potto.core.terms import (
     Const,
     Deriv,
     Global,
+    Holding,
     If,
     Index,
     Lam,
@@ -51,6 +52,14 @@ Groups = tuple[tuple[Term, ...], ...]
 MOST_ITEMS = 64  # functions in an array that are looked at one by one
 DEEPEST = 60  # calls inside calls
 MOST_NAMES = 100  # that a definition may lead through
+
+
+holds_call = Holding(App)
+
+
+def _below_calls(node: Term) -> tuple[Term, ...]:
+    """The children of a term, as far as there are calls in it: the rest stays as it is."""
+    return children(node) if holds_call(node) else ()
 
 
 def expanded(term: Term, resolve: Resolve, derive: Derive | None = None, rounds: int = 1) -> Term:
@@ -100,7 +109,10 @@ class Expansion:
 
     def run(self, term: Term, path: tuple[Term, ...]) -> Term:
         memo: dict[Term, Term] = {}
-        for node in postorder(term):
+        for node in postorder(term, below=_below_calls):
+            if not holds_call(node):
+                memo[node] = node
+                continue
             if isinstance(node, Proj):
                 memo[node] = proj(memo[node.term], node.index)
                 continue

@@ -25,7 +25,7 @@ def without_cancelled(node: Branch, variables: Iterable[str]) -> Branch:
         return node
     times = _occurrences(surface, named)
     lost = [x for x in named if times[x] > 1 and is_zero(sub(surface, substitute(surface, {x: _ELSEWHERE})))]
-    found = normal(surface) if lost and not any(True for _ in ends_of_domain(surface)) else None
+    found = normal(surface) if lost and not ends_of_domain(surface) else None
     top, below = (None, None) if found is None else (as_term(found.top), as_term(found.below))
     if top is None or below is None or not (top.free | below.free).isdisjoint(lost):
         return node

@@ -18,7 +18,7 @@ from msgspec.structs import replace
 from potto.calculus.algebra.ranges import nonnegative
 from potto.calculus.decomposition.critical import Critical
 from potto.calculus.inlining.currying import arguments_of, groups_of, sizes_of, uncurry
-from potto.calculus.inlining.expand import expanded
+from potto.calculus.inlining.expand import expanded, holds_call
 from potto.calculus.surfaces.nested_brackets import BINDERS, pieces
 from potto.calculus.surfaces.trace import CallSite, Side, Subkernel, layout, spine
 from potto.core.terms import (
@@ -97,11 +97,16 @@ def findings(term: Term, resolve: Resolve, decide: Decide = undecided) -> tuple[
     return (*found, *(Finding("kink", end) for end in ends))
 
 
-def ends_of_domain(surface: Term) -> Iterator[Term]:
-    """Where a condition stops being defined, if it does: on what lies beyond it has no side.
+@lru_cache(maxsize=4096)  # where another shader stands between the surfaces, they are what they were
+def ends_of_domain(surface: Term) -> tuple[Term, ...]:
+    """Where a condition stops being defined, if it does, each place once: on what lies beyond it has no side.
 
     An edge that is a period's is a pole, on both sides of which there is a value.
     """
+    return tuple(dict.fromkeys(_ends_of_domain(surface)))
+
+
+def _ends_of_domain(surface: Term) -> Iterator[Term]:
     for node in outside(surface, BINDERS):
         if isinstance(node, Prim) and node.free and node.op != "div":
             entry = PRIMITIVES[node.op]
@@ -120,10 +125,9 @@ def _carried_out(f: Finding, resolve: Resolve) -> Finding:
 def carried_out(term: Term, resolve: Resolve, rounds: int = 1) -> Term:
     """A term with the calls in it replaced by what they give, as far as `resolve` knows, also of functions that are
     parameters: then it can be solved. A recursion stays a call after some rounds."""
-    nodes = postorder(term)
-    if not any(isinstance(node, App) for node in nodes):
+    if not holds_call(term):
         return term
-    known = {node.name: resolve(node) for node in nodes if isinstance(node, Var)}
+    known = {node.name: resolve(node) for node in postorder(term) if isinstance(node, Var)}
     passed: dict[str, Term] = {name: function for name, function in known.items() if isinstance(function, Lam)}
     return expanded(substitute(term, passed), resolve, rounds=rounds)
 

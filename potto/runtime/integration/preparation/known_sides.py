@@ -109,7 +109,7 @@ def sided(term: Integral, inline: Resolve) -> Sided | None:
     written = {n.name: f for n in postorder(body) if isinstance(n, Var) and (f := inline(n)) is not None}
     surfaces = dict.fromkeys(node.surface for node in _branches(body))
     forms = {s: expanded(substitute(s, written), inline) for s in surfaces}
-    ends = {form: tuple(dict.fromkeys(ends_of_domain(form))) for form in forms.values() if enclosable(form)}
+    ends = {form: ends_of_domain(form) for form in forms.values() if enclosable(form)}
     told = {s: form for s, form in forms.items() if form in ends and all(map(enclosable, ends[form]))}
     flat = all(plane(form, (name,)) for form in told.values() for name in term.variables)
     few = FEW_OF_PLANES if flat else FEW_PARTS
