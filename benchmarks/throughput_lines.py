@@ -189,7 +189,8 @@ def mesh_pairs(asked: Asked) -> Iterator[Row]:
 
 
 def kernel_points(asked: Asked) -> Iterator[Row]:
-    """A kernel by itself: the shader and its derivative by c, without an integral."""
+    """A kernel by itself: the shader and its derivative by c, without an integral and without an error radius. Those by
+    hand do the same, into arrays that they are given; ours makes the ones that it answers in."""
     from potto.kernels.cells import Cell
 
     m = potto.compile(EQUATION)
