@@ -13,7 +13,7 @@ from msgspec import Struct
 
 from potto.calculus.checking.conditions import conditions_of
 from potto.calculus.checking.diffeo import exported
-from potto.calculus.checking.guards import unguarded
+from potto.calculus.decomposition.guards import unguarded
 from potto.calculus.explanation.decimals import in_decimals
 from potto.calculus.explanation.explain import describe
 from potto.calculus.explanation.fields import fields_of

@@ -9,6 +9,7 @@ An inner integral that does not vary with the variables around it stays: it is o
 
 from __future__ import annotations
 
+from potto.calculus.decomposition.guards import is_guard
 from potto.calculus.inlining.currying import arguments_of, sizes_of, uncurry
 from potto.calculus.inlining.expand import Resolve
 from potto.calculus.surfaces.trace import spine
@@ -25,6 +26,7 @@ from potto.core.terms import (
     Term,
     apply,
     bound_apart,
+    if_,
     integral,
     postorder,
     substitute,
@@ -64,6 +66,12 @@ def _inner(body: Term, around: frozenset[str], resolve: Resolve, calls: int) -> 
             return None if inner is None else _with(inner, body, 0)
         case Prim(op="mul"):
             return _among_factors(body, around, resolve, calls)
+        case If() if is_guard(body) and body.condition.free.isdisjoint(around):
+            inner = _inner(body.then, around, resolve, calls)
+            if inner is None:
+                return None
+            inner = bound_apart(inner, body.condition.free)
+            return _over(inner, if_(body.condition, inner.body, body.orelse))
         case App():
             made = _called(body, resolve) if calls else None
             return None if made is None else _inner(made, around, resolve, calls - 1)
@@ -112,6 +120,6 @@ def _called(call: App, resolve: Resolve) -> Term | None:
         return None
     params, body = uncurry(head, sizes_of(groups))
     args = arguments_of(head, groups)
-    if len(args) != len(params) or isinstance(body, If | Deriv):
+    if len(args) != len(params) or isinstance(body, Deriv) or (isinstance(body, If) and not is_guard(body)):
         return None
     return substitute(body, dict(zip(params, args, strict=True)))

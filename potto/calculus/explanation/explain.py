@@ -13,7 +13,7 @@ from msgspec.structs import replace
 
 from potto.calculus.algebra.ranges import Box, range_of
 from potto.calculus.algebra.rational_form import normal
-from potto.calculus.checking.guards import unguarded
+from potto.calculus.decomposition.guards import unguarded
 from potto.calculus.differentiation.boundary_terms import at_bounds, at_surfaces, jumps
 from potto.calculus.differentiation.deltas import without_deltas
 from potto.calculus.differentiation.derivative import NotSmooth

@@ -14,6 +14,7 @@ import numpy as np
 from msgspec.structs import replace
 
 from potto.calculus.decomposition.independent import in_factors
+from potto.calculus.decomposition.normal_combinations import combined
 from potto.calculus.surfaces.discontinuities import TooDeep
 from potto.core.terms import Integral
 from potto.diagnostics import PottoError
@@ -72,7 +73,8 @@ def _of_numbers(machine: Machine, term: Integral, env: dict[str, Value]) -> Valu
     with making:
         ready = prepared(term, linker.reach)
         if ready is term and machine.settings.method not in SAMPLED:
-            ready = in_factors(term)
+            ready = combined(term)
+            ready = in_factors(term) if ready is term else ready
             if ready is not term:  # sums of products are not products of sums
                 machine = machine.changed(into=None, of=None)
     if ready is not term:

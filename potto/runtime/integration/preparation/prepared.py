@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import lru_cache
 
+from potto.calculus.decomposition.guards import guarded_outside
 from potto.calculus.decomposition.joined import joined
 from potto.calculus.differentiation.deltas import without_deltas
 from potto.calculus.differentiation.derivative import NotSmooth, total, zero_like
@@ -79,6 +80,8 @@ def prepared(term: Integral, reach: Reach) -> Term:
             )]) from None  # fmt: skip
     if deltas:
         return term
+    if (outside := guarded_outside(term)) is not term:
+        return outside
     body = term.body
     if isinstance(body, Sum) and not (body.lo.free | body.hi.free) & set(term.variables):
         return sum_(body.variable, body.lo, body.hi, with_integrand(term, body.body))
