@@ -82,7 +82,7 @@ BODY_EDITS = [
     ("main.po", "v + 1", "v + 2", "both"),
 ]
 OF_TEXTS = {
-    "parsed", "head", "chunk_references", "occurring_names", "piece", "_piece_diagnostics", "occurring_in_piece",
+    "parsed", "head", "chunk_references", "occurring_names", "piece", "piece_diagnostics", "occurring_in_piece",
     "_group", "_group_diagnostics",
 }  # fmt: skip
 OF_FILES = {
