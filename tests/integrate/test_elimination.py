@@ -140,6 +140,66 @@ def test_the_mean_of_the_greatest(normals: list[tuple[float, float]]) -> None:
     assert abs(found.value - value) <= found.error and abs(found.tangent - rate) <= found.tangent_error
 
 
+THREE = "def f(t) integral (a ~ normal(0, 1), b ~ normal(t, 1), c ~ normal(0, 2)) {} d({})"
+
+
+@pytest.mark.parametrize("order", ["a, b, c", "c, a, b", "b, c, a"])
+def test_any_order_of_the_variables_may_hand_on_one_number(order: str) -> None:
+    """With c innermost, both of the others would have to be known further in."""
+    bounds = {"a": "a ~ normal(0, 1)", "b": "b ~ normal(t, 1)", "c": "c ~ normal(0, 2)"}
+    every = ", ".join(bounds[name] for name in order.split(", "))
+    f = potto.compile(f"def f(t) integral ({every}) [c > a]*[c > b] d({order})").f
+    found = potto.deriv(f)((0.3, 1.0))
+    assert found.converged and found.evals < 2_000_000
+    with mp.workdps(20):
+        places = mp.linspace(-20, 20, 21)
+        value = mp.quad(lambda c: mp.npdf(c, 0, 2) * mp.ncdf(c) * mp.ncdf(c - 0.3), places)
+        rate = -mp.quad(lambda c: mp.npdf(c, 0, 2) * mp.ncdf(c) * mp.npdf(c - 0.3), places)
+    assert abs(found.value - value) <= found.error and abs(found.tangent - rate) <= found.tangent_error
+
+
+@pytest.mark.parametrize(
+    ("body", "sign"),
+    [
+        ("([a > b]*[a > c]*a + [b >= a]*[b > c]*b + [c >= a]*[c >= b]*c)", 0),
+        ("(max(a, max(b, c)) - min(a, min(b, c)))", -1),
+    ],
+    ids=["cases", "range"],
+)
+def test_summands_are_eliminated_one_by_one(body: str, sign: int) -> None:
+    """Each of them in an order of its own. Together they took 20 million evaluations, and did not converge."""
+    found = potto.deriv(potto.compile(THREE.format(body, "a, b, c")).f)((0.3, 1.0))
+    assert found.converged and found.evals < 5_000_000
+    normals = [(0, 1), (mp.mpf(0.3), 1), (0, 2)]
+
+    def share(x: Any, way: int, i: int) -> Any:
+        beyond = [mp.ncdf(way * (x - m) / s) for m, s in normals]
+        return mp.npdf(x, *normals[i]) * mp.fprod(beyond[:i] + beyond[i + 1 :])
+
+    with mp.workdps(20):
+        places = mp.linspace(-24, 24, 25)
+        value = mp.quad(lambda x: x * mp.fsum(share(x, 1, i) for i in range(3)), places)
+        value += sign * mp.quad(lambda x: x * mp.fsum(share(x, -1, i) for i in range(3)), places)
+        rate = mp.quad(lambda x: share(x, 1, 1) + sign * share(x, -1, 1), places)
+    assert abs(found.value - value) <= found.error and abs(found.tangent - rate) <= found.tangent_error
+
+
+def test_summands_that_are_infinite_stay_together() -> None:
+    """Neither of the two has a mean, their difference has one."""
+    bounds = "a ~ cauchy(0, 1), b ~ normal(0, 1), c ~ normal(t, 1)"
+    f = potto.compile(f"def f(t) integral ({bounds}) (max(a, b) - max(a, c)) d(a, b, c)").f
+    found = potto.deriv(f)((0.3, 1.0))
+
+    def greater(a: Any, m: Any) -> Any:
+        return m * mp.ncdf(m - a) - a * mp.ncdf(m - a) + mp.npdf(a - m)  # the mean of max(a, .) - a
+
+    with mp.workdps(20):
+        places = [-mp.inf, -10, -1, 0, 1, 10, mp.inf]
+        value = mp.quad(lambda a: (greater(a, 0) - greater(a, mp.mpf(0.3))) / (mp.pi * (1 + a * a)), places)
+        rate = mp.quad(lambda a: -mp.ncdf(mp.mpf(0.3) - a) / (mp.pi * (1 + a * a)), places)
+    assert abs(found.value - value) <= found.error and abs(found.tangent - rate) <= found.tangent_error
+
+
 @pytest.mark.parametrize(
     ("body", "at"),
     [

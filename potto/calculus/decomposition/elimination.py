@@ -1,8 +1,8 @@
 """Integrals whose variables can be integrated out one by one, each as a function of one number.
 
-Owns `eliminate`. In an integral over x1, ..., xn what is left after some of them may depend on those further out
-through one number only: of a function of a sum it is the part of the sum that is known so far, in a chain f(x1, x2)
-f(x2, x3)... the variable before. Then
+Owns `eliminate`, and `eliminable`, which knows of sums. In an integral over x1, ..., xn what is left after some of them
+may depend on those further out through one number only: of a function of a sum it is the part of the sum that is known
+so far, in a chain f(x1, x2) f(x2, x3)... the variable before. Then
 
     V_i(s) = integral of w_i(s, x_i) V_{i+1}(p_i(s, x_i)) dx_i,
 
@@ -12,7 +12,8 @@ a function of one number that can be tabulated, so that n variables take n times
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+import itertools
+from collections.abc import Callable, Iterable, Iterator
 from fractions import Fraction
 from functools import lru_cache, partial, reduce
 
@@ -36,15 +37,19 @@ from potto.core.terms import (
     branch,
     children,
     div,
+    integral,
     mul,
     neg,
     postorder,
     prim,
     rebuild,
+    reordered,
     transform,
     var,
 )
 
+MOST_ORDERED = 4  # variables that are tried in every order
+MOST_SUMMANDS = 8
 Names = frozenset[str]
 Scaled = Callable[[Term], Term]
 
@@ -71,7 +76,38 @@ class _MoreThanOne(Exception):
 
 @lru_cache(maxsize=1024)
 def eliminate(term: Integral) -> tuple[EliminationStep, ...] | None:
-    """The steps, outermost first; None where more than one number would have to be handed on."""
+    """The steps, outermost first, in the first order of the variables that does; None where in each of them more than
+    one number would have to be handed on."""
+    return next((steps for order in _orders(term) if (steps := _in_order(order)) is not None), None)
+
+
+@lru_cache(maxsize=1024)
+def eliminable(term: Integral) -> tuple[Integral, ...]:
+    """Integrals that have steps and whose sum is this one: itself, else those of the summands of a factor; or none."""
+    if eliminate(term) is not None:
+        return (term,)
+    every, names = list(factors(term.body)), frozenset(term.variables)
+    for place, factor in enumerate(every):
+        parts = summands(factor, names)
+        if 1 < len(parts) <= MOST_SUMMANDS:
+            bodies = (mul(*every[:place], part, *every[place + 1 :]) for part in parts)
+            split = tuple(integral(term.variables, term.bounds, body, term.hints) for body in bodies)
+            if all(eliminate(each) is not None for each in split):
+                return split
+    return ()
+
+
+def _orders(term: Integral) -> Iterator[Integral]:
+    """The integral as it is written, and in the other orders of a few variables, where the bounds allow that."""
+    yield term
+    count, names = len(term.variables), frozenset(term.variables)
+    if count > MOST_ORDERED or any((lo.free | hi.free) & names for lo, hi in term.bounds):
+        return
+    for order in list(itertools.permutations(range(count)))[1:]:
+        yield reordered(term, list(order))
+
+
+def _in_order(term: Integral) -> tuple[EliminationStep, ...] | None:
     everything = (term.body, *(bound for pair in term.bounds for bound in pair))
     kinds = (Const, Var, Prim, Branch, If, App, Global)
     if not all(isinstance(node, kinds) for part in everything for node in postorder(part)):

@@ -9,7 +9,7 @@ import itertools
 import math
 from collections.abc import Iterable, Iterator
 
-from potto.calculus.decomposition.elimination import eliminate
+from potto.calculus.decomposition.elimination import eliminable
 from potto.calculus.differentiation.level_sets import placed_along
 from potto.core.terms import Integral, Term, reordered
 from potto.integrate.fixed.at_sight import worth_a_look
@@ -102,7 +102,7 @@ def worth_trials(problem: Problem) -> bool:
 def passes_on(problem: Problem) -> bool:
     """Whether variables may be eliminated where iterated quadrature, which suits so few, turns out to take long."""
     three = len(problem.term.variables) == MOST_LEVELS
-    return three and not problem.machine.frozen and eliminate(problem.term) is not None
+    return three and not problem.machine.frozen and bool(eliminable(problem.term))
 
 
 def preferred(problem: Problem) -> Iterable[Integral]:

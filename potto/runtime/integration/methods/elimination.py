@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from potto.calculus.decomposition.elimination import eliminable
 from potto.integrate.elimination.recursion import AFFORDABLE, Eliminated, one_by_one
 from potto.integrate.events import Fold
 from potto.integrate.pieces import Sums
@@ -33,11 +34,24 @@ def step_by_step(problem: Problem, limit: float) -> Sums | None:
 
 
 def eliminated(problem: Problem) -> list[Attempt]:
-    """What one integral comes to where each variable hands one number on; nothing where none does, where it takes more
-    evaluations than can be afforded, or something was met that tables do not tell."""
-    known, apart = problem.steps(), problem.apart()
-    row = None if known is None else _member(known, apart)
-    return [] if row is None or apart.events else [Attempt(problem.term, row, apart.events, tabled=True)]
+    """What one integral, or each of its summands, comes to where each variable hands one number on; nothing where none
+    does, where it takes more evaluations than can be afforded, or something was met that tables do not tell."""
+    apart, rows = problem.apart(), []
+    for term in eliminable(problem.term):
+        own = apart if term is problem.term else apart.changed(term=term)
+        known = own.steps()
+        row = None if known is None else _member(known, own)
+        if row is None:
+            return []
+        rows.append(row)
+    return [] if not rows or apart.events else [Attempt(problem.term, _added(rows), apart.events, tabled=True)]
+
+
+def _added(rows: list[Sums]) -> Sums:
+    total, *others = rows
+    for row in others:
+        total = Sums(total.v + row.v, total.e + row.e, total.t + row.t, total.et + row.et)
+    return total
 
 
 def _member(known: Eliminated, problem: Problem) -> Sums | None:
