@@ -339,8 +339,8 @@ class Machine:
         elif met:
             raise (errors.Coincidence if self.root else PottoError)([PRODUCT_OF_DELTAS(
                 errors.NOWHERE,
-                "the second derivative does not exist here: two surfaces coincide, or one passes through a corner",
-                notes=("it would hold a product of deltas on the same surface",),
+                "no second derivative is known here: two surfaces coincide, or one passes through a corner",
+                notes=("where both jump, it holds a product of deltas on the same surface, and does not exist",),
                 help="move the parameters apart, or differentiate only once",
             )])  # fmt: skip
         if surface.__class__ is float:
