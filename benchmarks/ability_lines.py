@@ -13,7 +13,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-CATALOGUES = [str(Path(__file__).resolve().parent.parent / "tests" / folder) for folder in ("catalogue", "integrate")]
+TESTS = Path(__file__).resolve().parent.parent / "tests"
+CATALOGUES = [str(TESTS / folder) for folder in ("catalogue", "integrate", ".")]
 TURNS = 3  # of which the fastest counts
 SETTLING = 0.5  # seconds of calls before the first that counts: machine code takes over meanwhile, in its own time
 CLOCK = time.process_time  # what others do on the machine is no part of it

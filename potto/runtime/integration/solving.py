@@ -38,6 +38,7 @@ from potto.runtime.integration.methods.attempts import (
     uncertainty,
 )
 from potto.runtime.integration.methods.choices import (
+    endless,
     many,
     passes_on,
     preferred,
@@ -143,7 +144,7 @@ def along_cuts(problem: Problem) -> Sums:
     tables: list[Attempt] | None = None
     for order in preferred(problem):
         found = attempted(problem, order, most)
-        if most is not None and found.stopped and tables is None and not found.events.every(Degenerate):
+        if found.stopped and tables is None and endless(problem) and not found.events.every(Degenerate):
             tables = eliminated(problem) if passes_on(problem) else []
             if tables and accurate(tables[0].sums, machine.rtol, machine):
                 return tables[0].sums
@@ -157,16 +158,16 @@ def along_cuts(problem: Problem) -> Sums:
             if not worth_trials(problem):
                 break
     if stopped:
-        return _by_samples_instead(problem, best(stopped)) or with_all(problem, stopped, most, tables or [])
+        return _by_samples_instead(problem, best(stopped)) or with_all(problem, stopped, most, tables)
     events.take(found.events, np.arange(problem.batch))
     return _along_axes(problem, problem.plan(order), found.sums)
 
 
-def with_all(problem: Problem, tried: list[Attempt], most: int | None, tables: list[Attempt]) -> Sums:
+def with_all(problem: Problem, tried: list[Attempt], most: int | None, tables: list[Attempt] | None) -> Sums:
     """The best answer where trials in some orders of the variables did not come to an end, or to no bound: in the order
     of which most is known, or by tables, with more and more evaluations.
 
-    most: the evaluations that each trial took. tables: what they came to, if there are any.
+    most: the evaluations that each trial took. tables: what they came to; None if they were not tried.
     """
     machine, longer = problem.machine, list[Attempt]()
     if machine.overdrawn():  # so many cuts that the first nodes of a trial are more than there are
@@ -183,6 +184,10 @@ def with_all(problem: Problem, tried: list[Attempt], most: int | None, tables: l
             break  # those that are not accurate though they came to an end may be in another order
     if not longer or not longer[-1].stopped:
         return finished(problem, best((*tried, *longer)))
+    if tables is None:
+        tables = eliminated(problem) if passes_on(problem) else []
+        if tables and accurate(tables[0].sums, max(ACCURATE, machine.rtol), machine):
+            return tables[0].sums
     if len(longer) == 1:
         longer.append(attempted(problem, longer[0].order, None))
     return finished(problem, best((*tried, *tables, *longer)))

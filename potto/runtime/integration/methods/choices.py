@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator
 
 from potto.calculus.decomposition.elimination import eliminable
 from potto.calculus.differentiation.level_sets import placed_along
-from potto.core.terms import Integral, Term, reordered
+from potto.core.terms import INF, Integral, Term, postorder, reordered
 from potto.integrate.fixed.at_sight import worth_a_look
 from potto.runtime.integration.problem import Problem
 
@@ -103,6 +103,12 @@ def passes_on(problem: Problem) -> bool:
     """Whether variables may be eliminated where iterated quadrature, which suits so few, turns out to take long."""
     three = len(problem.term.variables) == MOST_LEVELS
     return three and not problem.machine.frozen and bool(eliminable(problem.term))
+
+
+def endless(problem: Problem) -> bool:
+    """Whether a range is infinite: over such iterated quadrature takes long as a rule."""
+    ends = (end for pair in problem.term.bounds for end in pair)
+    return any(node is INF for node in postorder(*ends))
 
 
 def preferred(problem: Problem) -> Iterable[Integral]:
