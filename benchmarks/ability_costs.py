@@ -200,13 +200,13 @@ def thermostat() -> Finding:
 
 def mesh_pairs() -> Finding:
     """Pixels and triangles of a warped mesh with their gradients, all at once and one by one."""
-    from test_members import MODULE, NAMES, WRT, area, mesh
+    from test_members import MODULE, NAMES, WRT, covered_area, mesh
 
     rows = mesh("warped", 400)
     f = potto.grad(MODULE.covered, WRT)
     together, seconds = once(lambda: f(**dict(zip(NAMES, rows.T))))
     single = [f(**dict(zip(NAMES, map(float, row)))) for row in rows]
-    exact = np.array([area(row) for row in rows])
+    exact = np.array([covered_area(row) for row in rows])
     off = float(np.max(np.abs(together.value - exact))) * 256  # of a pixel's area
     ratio = together.evals / sum(one.evals for one in single)
     same = all(one.converged == told for one, told in zip(single, together.member_converged))
