@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 logger = logging.getLogger(__name__)
 LONG = 0.05  # seconds after which an edit interrupts even a quick question
 REST = 1.0  # seconds without anything to do after which there is time for more
+YIELDING = ("diagnosis", "slow", "idle")  # jobs that give way to what comes
 PATIENCE = 8  # how often a job gives way to questions; after that it is finished first, or it might never be
 
 _claims = Lock()
@@ -98,8 +99,7 @@ class Worker:
             return
         if job.kind == "quick" and running.given_way >= PATIENCE:
             return
-        waits = running.kind in ("diagnosis", "slow", "idle")
-        if waits or (job.kind == "edit" and time.monotonic() - self._since > LONG):
+        if running.kind in YIELDING or (job.kind == "edit" and time.monotonic() - self._since > LONG):
             db.cancel()
 
     def cancelled(self, job: Job) -> None:
@@ -178,6 +178,8 @@ class Worker:
         self._since, self._running = time.monotonic(), job
         try:
             with self._db.evaluating():
+                if job.kind in YIELDING and job.given_way < PATIENCE and not self._inbox.empty():
+                    raise Cancelled  # what came before this evaluation began could not cancel it
                 job.run(job)
         except Cancelled:
             self._give_way(job)

@@ -123,6 +123,21 @@ def test_a_question_about_a_whole_file_does_not_stop_the_diagnostics_of_an_open_
     assert world.finished() == ["edit", "open begins", "open ends", "pull", "lenses"]
 
 
+def test_a_question_that_comes_between_two_steps_waits_for_neither() -> None:
+    world = World()
+
+    def steps() -> Iterator[Callable[[], None] | None]:
+        yield lambda: world.done.append("step")
+        world.put("quick", "hover")  # no job runs that could give way to it, and the next one is chosen already
+        yield lambda: world.done.append("next step")
+        yield world.rested.set
+
+    world.worker = Worker(lambda: world.db, steps)
+    world.put("edit", "edit")
+    world.worker.start()
+    assert world.finished() == ["edit", "step", "hover", "next step"]
+
+
 def test_idle_work_that_fails_leaves_questions_answered() -> None:
     world = World()
 
