@@ -26,6 +26,7 @@ from potto.core.terms import (
     App,
     Branch,
     Const,
+    Delta,
     Global,
     If,
     Integral,
@@ -46,7 +47,7 @@ from potto.core.terms import (
     var,
 )
 
-KINDS = (Const, Var, Prim, Branch, If, App, Global)
+KINDS = (Const, Var, Prim, Branch, Delta, If, App, Global)
 TWO = const(2.0)
 TOGETHER = "@together"  # behind the name of the first variable of a combination
 WIDE = (3.0, 8.0)  # where rules look at a normal density, in standard deviations: as the measure does
@@ -61,16 +62,14 @@ class _Normal(Struct, frozen=True):
 
 
 @lru_cache(maxsize=4096)
-def combined(term: Integral) -> Term:
-    """An equal integral over fewer variables, times a number; the same term where none are combined."""
-    scale: list[Term] = []
+def combined(term: Integral) -> Integral:
+    """An equal integral over fewer variables; the same term where none are combined."""
     while (found := _one_less(term)) is not None:
-        factor, term = found
-        scale.append(factor)
-    return mul(*scale, term) if scale else term
+        term = found
+    return term
 
 
-def _one_less(term: Integral) -> tuple[Term, Integral] | None:
+def _one_less(term: Integral) -> Integral | None:
     every = list(factors(term.body))
     normals = {name: found for name in term.variables if (found := _normal(term, every, name)) is not None}
     if len(normals) < 2 or not all(isinstance(node, KINDS) for node in postorder(term.body)):
@@ -87,11 +86,12 @@ def _one_less(term: Integral) -> tuple[Term, Integral] | None:
     return None
 
 
-def _put(
-    term: Integral, normals: tuple[_Normal, _Normal], combination: _Combination, body: Term
-) -> tuple[Term, Integral]:  # fmt: skip
-    """The integral over a combination in the place of the first of its two variables, and the factor that this
-    leaves."""
+def _put(term: Integral, normals: tuple[_Normal, _Normal], combination: _Combination, body: Term) -> Integral:
+    """The integral over a combination in the place of the first of its two variables.
+
+    The factor that this leaves stays under the integral: outside, what it changes by would have to cancel against what
+    the densities change by.
+    """
     assert combination.weights is not None
     (a, b), (first, second), (x, y), name = combination.weights, normals, combination.pair, combination.name
     mean = add(mul(a, first.mean), mul(b, second.mean))
@@ -105,7 +105,9 @@ def _put(
     kept = [(name, bounds, hints) if v == x else (v, bounds, own) for v, bounds, own in rows if v != y]
     variables, bounds, every = (tuple(column) for column in zip(*kept, strict=True))
     factor = div(mul(first.spread, second.spread, prim("sqrt", mul(TWO, PI))), spread)
-    return factor, integral(variables, bounds, mul(density, body), every)
+    whole = integral(variables, bounds, mul(factor, density, body), every)
+    assert isinstance(whole, Integral)
+    return whole
 
 
 def _normal(term: Integral, every: Sequence[Term], name: str) -> _Normal | None:

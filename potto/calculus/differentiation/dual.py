@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 from potto.calculus.decomposition.joined import joined
+from potto.calculus.decomposition.normal_combinations import combined
 from potto.calculus.differentiation import loops
 from potto.calculus.differentiation.between import scaled
 from potto.calculus.differentiation.boundary_terms import at_bounds, at_surfaces, jumps
@@ -366,8 +367,9 @@ class _Pass:
         whole = resolved(loops.stepped(self.owner.carried_out(joined(node, self.owner.resolve))))
         if isinstance(whole, Integral) and isinstance(whole.body, Array | ListOf):
             whole = loops.of_integrals(whole)
-        if not isinstance(whole, Integral):
-            return _Pass(self.owner, self.tangents).run(whole)
+        fewer = whole if self.owner.folding or not isinstance(whole, Integral) else combined(whole)
+        if not isinstance(whole, Integral) or fewer is not whole:  # deltas of a combination have one root
+            return _Pass(self.owner, self.tangents).run(fewer)
         plain = without_leftovers(without_deltas(whole, self.owner.folding))
         if not isinstance(plain, Integral):
             return _Pass(self.owner, self.tangents).run(plain)

@@ -71,10 +71,11 @@ def _of_numbers(machine: Machine, term: Integral, env: dict[str, Value]) -> Valu
         term, stopped = held(term)
         env = {**env, **{new: pad(still(env[old]), machine.directions) for old, new in stopped}}
     with making:
-        ready = prepared(term, linker.reach)
-        if ready is term and machine.settings.method not in SAMPLED:
-            ready = combined(term)
-            ready = in_factors(term) if ready is term else ready
+        sampled = machine.settings.method in SAMPLED
+        fewer = term if sampled else combined(term)  # before deltas take a variable's density apart
+        ready = prepared(term, linker.reach) if fewer is term else fewer
+        if ready is term and not sampled:
+            ready = in_factors(term)
             if ready is not term:  # sums of products are not products of sums
                 machine = machine.changed(into=None, of=None)
     if ready is not term:
