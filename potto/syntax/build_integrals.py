@@ -60,12 +60,13 @@ def integral_unbounded(context: Context, v: Values) -> Integral:
 def _match_bounds(context: Context, bounds: Values, variables: tuple[Binder, ...], place: Span) -> None:
     if len(bounds) != len(variables):
         over = Span(bounds[0].span.start, bounds[-1].span.end)
+        several = "; those of several stand in parentheses: `([0, 1], [0, 1])`" if len(bounds) == 1 else ""
         context.report(
             kinds.BOUNDS(
                 place,
                 f"{_count(len(variables), 'variable')} of integration, but bounds for {len(bounds)}",
                 related=(Related(over, f"bounds for {len(bounds)}"),),
-                help="give one `[lo, hi]` (or `x ~ …`) for each variable, in the order of `d(...)`",
+                help=f"give one `[lo, hi]` (or `x ~ …`) for each variable, in the order of `d(...)`{several}",
             )
         )
         return

@@ -102,6 +102,17 @@ def test_values_with_gradients_and_hessians(name: str) -> None:
     hold(second.value, second.error, wanted)
 
 
+def test_derivatives_have_the_names_of_their_parameters() -> None:
+    f = potto.compile("def f(a, t) integral [0, 1] a*[x < t] d(x)").f
+    slope = potto.value_and_grad(f, ["t", "a"])(3.0, 0.25)[1]
+    hold(slope["a"].value, slope["a"].error, 0.25)
+    hold(slope["t"].value, slope["t"].error, 3.0)
+    assert slope["a"] == slope[1] and potto.value_and_grad(f, "t")(3.0, 0.25)[1]["t"] == 3.0
+    for answer in (slope, potto.grad(f, ["t", "a"])(3.0, 0.25)):
+        with pytest.raises(KeyError, match="no derivative by 'b' here, but by t, a"):
+            answer["b"]
+
+
 def test_the_first_parameter_is_meant_where_none_is_named() -> None:
     f = potto.compile(CASES["boundary"][0]).f
     at = CASES["boundary"][1]

@@ -193,6 +193,12 @@ def test_bounds() -> None:
     """)
 
 
+@pytest.mark.parametrize("body", ["x*y", "(x*y)", "[x + y < 1]"])
+def test_bounds_beside_each_other(body: str) -> None:
+    ((found, _),) = messages(f"a = integral [0, 1] [0, 1] {body} d(x, y)")
+    assert found.code == "P0109" and "those of several stand in parentheses" in (found.help or "")
+
+
 def test_duplicates() -> None:
     check_messages("""
         def f(x, x) x
