@@ -14,7 +14,16 @@ from zlib import crc32
 
 from potto.modules.free import Reference
 from potto.modules.grouping import grouped
-from potto.modules.lookup import DefinitionTarget, ModuleTarget, Target, bindings, find_module, resolve, resolve_member
+from potto.modules.lookup import (
+    DefinitionTarget,
+    ImportBinding,
+    ModuleTarget,
+    Target,
+    bindings,
+    find_module,
+    resolve,
+    resolve_member,
+)
 from potto.modules.texts import chunk_references, chunk_text, imports, is_diffeo, names
 from potto.query import Database, query
 
@@ -34,10 +43,21 @@ def imported_files(db: Database, file: str) -> tuple[str, ...]:
         if target is not None:
             found[target] = None
         for name, imported in bindings(item):
-            module = resolve(db, file, name) if imported.name is not None else None
+            module = resolve(db, file, name) if _may_be_module(db, file, target, imported) else None
             if isinstance(module, ModuleTarget):  # `from pkg import m`
                 found[module.file] = None
     return tuple(found)
+
+
+def _may_be_module(db: Database, file: str, target: str | None, imported: ImportBinding) -> bool:
+    """Whether what is imported by its name from `target` can be a module: one in a folder of that name, or what
+    `target` has imported itself. So that to follow imports, however far, no file is asked what it defines."""
+    if imported.name is None:
+        return False
+    bound = () if target is None else imports(db, target)
+    return any(name == imported.name for item in bound for name, _ in bindings(item)) or (
+        find_module(db, file, f"{imported.module}.{imported.name}") is not None
+    )
 
 
 @query(travels=True, cuts=True)

@@ -97,6 +97,10 @@ def is_diffeo(file: str) -> bool:
 @query
 def content(db: Database, file: str) -> str | Unreadable | None:
     """The text that counts: an open editor's, else that on disk."""
+    return _content(db, file)
+
+
+def _content(db: Database, file: str) -> str | Unreadable | None:
     overlay: str | None = db.get_input(("overlay", file))
     if overlay is not None:
         return overlay
@@ -120,8 +124,8 @@ def problem(db: Database, file: str) -> Unreadable | None:
 
 @query(travels=True, cuts=True)
 def exists(db: Database, file: str) -> bool:
-    """Whether there is such a file that an import could mean."""
-    text = content(db, file)
+    """Whether there is such a file that an import could mean. Mostly there is none, so nothing is kept but this."""
+    text = _content(db, file)
     return isinstance(text, str) or (isinstance(text, Unreadable) and text.reason not in ("folder", "not a file"))
 
 
@@ -196,7 +200,6 @@ class FileOutline:
     """What of a file's layout no body edit and no move changes. `nameless`: a broken chunk might define anything."""
 
     names: tuple[str, ...]
-    import_texts: tuple[str, ...]
     nameless: bool
 
 
@@ -261,10 +264,9 @@ def texts(db: Database, file: str) -> Parted:
 
 @query(travels=True, cuts=True)
 def outline(db: Database, file: str) -> FileOutline:
-    """What a file defines and imports, without places."""
+    """What a file defines, without places."""
     found = layout(db, file)
-    importing = tuple([chunk.text for piece in found.pieces for chunk in piece.imports])
-    return FileOutline(tuple(found.place), importing, any(piece.nameless for piece in found.pieces))
+    return FileOutline(tuple(found.place), any(piece.nameless for piece in found.pieces))
 
 
 @query(travels=True)
@@ -359,8 +361,23 @@ def statements(db: Database, file: str) -> tuple[StatementRef, ...]:
 @query(cuts=True)
 def imports(db: Database, file: str) -> tuple[Importing, ...]:
     """The imports of a file in order, their spans relative to their chunks: moving them changes nothing."""
-    items = (head(db, text, is_diffeo(file)).importing for text in outline(db, file).import_texts)
+    items = (head(db, text, is_diffeo(file)).importing for text in import_texts(db, file))
     return tuple(item for item in items if item is not None)
+
+
+@query(travels=True, cuts=True)
+def import_texts(db: Database, file: str) -> tuple[str, ...]:
+    """The chunks of a file that import. Only pieces with a word for it are cut into chunks: of the files that others
+    import from, however far, mostly the beginnings are read."""
+    diffeo = is_diffeo(file)
+    return tuple([text for group in groups_of_pieces(db, file) for text in _import_texts(db, group, diffeo)])
+
+
+@query(keep=128)
+def _import_texts(db: Database, group: tuple[str, ...], diffeo: bool) -> tuple[str, ...]:
+    """The chunks of a group of pieces that import. Each has one of the words as its first, however broken it is."""
+    importing = [text for text in group if "import" in text or "from" in text]
+    return tuple([chunk.text for text in importing for chunk in piece(db, text, diffeo).imports])
 
 
 def import_starts(db: Database, file: str) -> tuple[int, ...]:

@@ -309,9 +309,7 @@ class Engine:
         if memo.low < index:
             memo.provisional, memo.verified_at = True, -1
             self._provisional.append(memo)
-            for member in self._provisional[
-                mark:
-            ]:  # members that depended on this one now depend on what it depends on
+            for member in self._provisional[mark:]:  # if it depended on this one, then on what this depends on
                 member.low = min(member.low, memo.low)
         elif memo.cyclic:
             self._close_cycle(memo, mark)
@@ -338,7 +336,8 @@ class Engine:
             level = dep.durability
             if level < DURABILITIES:
                 kept.append(dep)
-                durability = min(durability, level)
+                if level < durability:
+                    durability = level
         memo.durability, memo.deps = durability, tuple(kept)
         memo.leaves = () if durability else leaves_of(memo.deps)
         memo.verified_at = self.revision if durability < DURABILITIES else FOREVER

@@ -21,14 +21,22 @@ def leaves_of(deps: tuple[Node, ...]) -> tuple[Leaf, ...] | None:
             continue
         if not isinstance(dep, Memo) or dep.cuts:
             own.append(dep)
-        elif dep.leaves is None:
+            continue
+        leaves = dep.leaves
+        if leaves is None:
             return None
-        elif dep.leaves is not widest:
-            others.append(dep.leaves)
-            if len(dep.leaves) > len(widest):
-                widest = dep.leaves
-    if len(others) <= 1 and all(dep in widest or _is_covered(dep, widest) for dep in own):
-        return widest
+        if leaves is not widest:
+            others.append(leaves)
+            if len(leaves) > len(widest):
+                widest = leaves
+    if len(others) <= 1:
+        for leaf in own:
+            if leaf not in widest and not _is_covered(leaf, widest):
+                break
+        else:
+            return widest
+        if len(own) == 1 and not others:
+            return tuple(own)
     union = set(own)
     for leaves in others:
         union.update(leaves)

@@ -190,10 +190,12 @@ class Memo:
         before is added to `changes`."""
         if self.value is not GONE and same(self.value, value):
             return
-        old, entries = self.value, self.entries or {}
+        old, entries = self.value, self.entries
         if self.changed_at >= 0:
             changes.add(self)
         renew(self, value, revision)
+        if entries is None:
+            return
         changed: Iterable[Any] = entries
         if isinstance(value, Parted) and isinstance(old, Parted):
             changed = value.may_differ(old) & entries.keys()

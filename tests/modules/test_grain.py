@@ -21,6 +21,7 @@ from potto.modules import (
     strongly_connected,
     syntax_diagnostics,
 )
+from potto.modules.texts import import_starts
 from potto.query import Database, QueryEvent
 
 MAIN, LIB = key("main.po"), key("lib.po")
@@ -187,3 +188,14 @@ def test_incremental_is_from_scratch(
     fresh = Database()
     put(fresh)
     assert ask_everything(db) == ask_everything(fresh)
+
+
+WORDS = [*"xy1=(),+:.*[]", "m.k", "as", "def", "record", "for", "in", "if", "then", "let", "sum", "d(x)", "\n"]
+
+
+@settings(max_examples=300)
+@given(st.lists(st.sampled_from(WORDS), max_size=8))
+def test_no_text_is_taken_for_an_import_that_has_no_word_for_it(words: list[str]) -> None:
+    text = " ".join(words)
+    db = world("# file: main.po\n" + text)
+    assert import_starts(db, MAIN) == () == imports(db, MAIN)

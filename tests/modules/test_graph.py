@@ -124,6 +124,38 @@ def test_imports_and_their_cycles() -> None:
     assert import_cycle(db, key("pkg/m.po")) == ()
 
 
+def test_a_module_by_its_name_is_imported_also_where_another_file_has_imported_it() -> None:
+    db = world("""
+        # file: a.po
+        from b import k, g, m, here
+        # file: b.po
+        import pkg.far as k
+        def g(x) x
+        import pkg.near as here
+        def here(x) x
+        # file: b/g.po
+        def no(x) x
+        # file: b/m.po
+        def yes(x) x
+        # file: pkg/far.po
+        def f(x) x
+        # file: pkg/near.po
+        def f(x) x
+    """)
+    # `g` and `here` are definitions of b, which win over the module in the folder b and over the import in b
+    assert imported_files(db, key("a.po")) == tuple(map(key, ("b.po", "pkg/far.po", "b/m.po")))
+
+
+def test_imports_are_followed_without_asking_what_the_files_define() -> None:
+    long = "".join(f"def f{n}(x) x + {n}\n" for n in range(1000))
+    db = world(f"# file: a.po\nfrom b import f1\n# file: b.po\nfrom c import f2\n{long}# file: c.po\n{long}")
+    with db.recording() as events:
+        assert import_group(db, key("a.po")) == (key("a.po"),)
+    asked = [event.query for event in events]
+    assert not {"layout", "outline", "names", "scope"} & set(asked)
+    assert asked.count("piece") == 2, "where the imports are"
+
+
 def test_a_long_chain_of_definitions_and_of_modules() -> None:
     text = "".join(f"def f{n}(x) f{n + 1}(x)\n" for n in range(2000)) + "def f2000(x) f1999(x)\n"
     db = world(text)
