@@ -21,6 +21,7 @@ their cancellation, requests and notifications to the client, the codes of error
 from __future__ import annotations
 
 import logging
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import Future, InvalidStateError
 from contextlib import suppress
@@ -185,7 +186,7 @@ def _no_converter() -> Converter:
     return cast("Converter", None)
 
 
-class StreamServer(JsonRPCServer):
+class StreamServer(JsonRPCServer, ABC):
     """A server of pygls that reads one stream on the thread that runs it, and knows when a session may ask what."""
 
     protocol: Protocol
@@ -201,17 +202,17 @@ class StreamServer(JsonRPCServer):
             self.protocol.handle_message(message)
         return 1
 
+    @abstractmethod
     def refused(self, method: str) -> RequestError | None:
         """Why a request is refused at this stage of the session, if it is."""
-        raise NotImplementedError
 
+    @abstractmethod
     def listens(self, method: str) -> bool:
         """Whether notifications are heeded at this stage."""
-        raise NotImplementedError
 
+    @abstractmethod
     def status(self) -> int:
         """The exit status, when the client says `exit`."""
-        raise NotImplementedError
 
     def report_server_error(self, error: Exception, source: Any) -> None:
         """Log an error; the user could do nothing about it."""

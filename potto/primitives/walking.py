@@ -7,6 +7,7 @@ choices; whatever an entry has no rule for in a domain is done to its defining f
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
 from typing import Generic, TypeVar
@@ -18,19 +19,20 @@ V = TypeVar("V")
 Rule = Callable[..., V]
 
 
-class Domain(Generic[V]):
+class Domain(ABC, Generic[V]):
     """Values of one kind. Domains keep nothing of the terms that they walk over, so that one object serves all."""
 
+    @abstractmethod
     def constant(self, node: Const) -> V:
-        raise NotImplementedError
+        """A number that is written."""
 
+    @abstractmethod
     def rule(self, entry: Primitive) -> Rule[V] | None:
         """The domain's own rule for a builtin, from its entry; None if it has none."""
-        raise NotImplementedError
 
+    @abstractmethod
     def unknown(self) -> V:
         """What nothing is known of."""
-        raise NotImplementedError
 
     def other(self, node: Term, known: Mapping[Term, V]) -> V:
         """Choices, and whatever else is not a number, variable or builtin."""

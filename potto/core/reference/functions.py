@@ -117,6 +117,9 @@ class _Exact(Domain[Number]):
         own = getattr(mp, name) if not where else globals()[name] if where == "potto" else of_python(entry.mpmath)
         return _real(own, entry.within) if not entry.truth and entry.name not in _TAKES_ANYTHING else own
 
+    def unknown(self) -> Number:
+        raise LookupError("a builtin that has neither a function of mpmath nor a formula")
+
 
 _EXACT = _Exact()
 
