@@ -64,6 +64,9 @@ def _leave() -> None:
 def _guarded(arguments: list[str]) -> int:
     import os
 
+    # Of numpy's linear algebra, before numpy is loaded: its threads turn while they wait, for 20 ms of a command, and
+    # what is large is divided among threads of ours.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from potto.cli.command_line import dispatch
 
     try:

@@ -24,10 +24,14 @@ import time
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from functools import lru_cache
-from hashlib import blake2b
-from pathlib import Path
+from typing import TYPE_CHECKING
 
 from msgspec import Struct
+
+from potto.digests import blake2b
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 DEFAULT_MB = 256
 _FOLDER = "store"
@@ -72,16 +76,28 @@ class StoreReport(Struct, frozen=True):
 
 def cache_folder() -> Path | None:
     """Where Potto keeps what it can make again; None where `POTTO_CACHE` is `off`."""
+    from pathlib import Path  # which an answer from the store does without
+
+    found = _base()
+    return None if found is None else Path(found)
+
+
+def is_on() -> bool:
+    """Whether anything is to be kept."""
+    return _base() is not None
+
+
+def _base() -> str | None:
     own = os.environ.get("POTTO_CACHE")
     if own:
-        return None if own.lower() == "off" else Path(own)
+        return None if own.lower() == "off" else own
     if sys.platform == "win32":
         base = os.environ.get("LOCALAPPDATA") or os.path.expanduser("~\\AppData\\Local")
     elif sys.platform == "darwin":
         base = os.path.expanduser("~/Library/Caches")
     else:
         base = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
-    return Path(base) / "potto"
+    return os.path.join(base, "potto")
 
 
 def get(kind: str, key: bytes) -> bytes | None:
@@ -133,7 +149,7 @@ def complaint() -> str | None:
 
     A folder that cannot be made or written is no reason to complain.
     """
-    folder = cache_folder()
+    folder = _base()
     return None if folder is None else _judged(os.path.join(folder, _FOLDER))[1]
 
 
@@ -300,7 +316,7 @@ def _delete_abandoned(folder: str, age: float) -> None:
 
 def _folder() -> str | None:
     """The folder of entries, if there is one that can be trusted."""
-    base = cache_folder()
+    base = _base()
     return None if base is None else _judged(os.path.join(base, _FOLDER))[0]
 
 

@@ -17,12 +17,12 @@ import stat
 import sys
 import tempfile
 from collections.abc import Hashable, Iterator, Mapping
-from hashlib import blake2b
 from pathlib import Path
 from typing import Any
 
 from potto import store
 from potto.diagnostics import Diagnostic, Related, Replacement, Suggestion
+from potto.digests import blake2b
 from potto.modules.texts import content
 from potto.query import Database
 from potto.reports.render import Located

@@ -21,7 +21,7 @@ from potto.kernels.errors import wrong_call
 from potto.python.functions import Function
 from potto.python.gradients import grad
 from potto.runtime.answers.estimate import Estimate
-from potto.runtime.answers.named import has_records
+from potto.runtime.answers.records import has_records
 from potto.types.types import ArrayOf, TupleOf, Type
 
 Path = tuple[str | int, ...]

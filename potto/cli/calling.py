@@ -116,8 +116,8 @@ def argument_in(world: World, file: str, text: str, name: str = "") -> Any:
     """What a parameter, of this name if it is known, is given: a function, or numbers; records as dicts, so that their
     fields find each other by name. Raises ProgramError."""
     from potto.applications.fitting import by_fields
+    from potto.evaluating.answering import EXPRESSION
     from potto.evaluating.given import as_typed
-    from potto.evaluating.world import EXPRESSION
     from potto.python.functions import Function
     from potto.reports.render import ProgramError
     from potto.types.types import Diffeo

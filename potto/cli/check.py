@@ -11,7 +11,8 @@ from potto.cli.console import Console
 
 if TYPE_CHECKING:
     from potto.checking.library import Library
-    from potto.reports.render import Located
+    from potto.checking.recalled import Question
+    from potto.reports.render import Located, Sources
 
 SUMMARY = "say what is wrong with programs, where, and what to do"
 EXAMPLE = "  potto check examples/ --watch"
@@ -23,12 +24,23 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
+    from potto.checking.recalled import Question
+
+    question = Question(("check",), tuple(options.paths))
+    sound = None if options.watch else question.recalled()
+    if sound is not None:
+        _tell([], sound, lambda file: None, options, console)
+        return 0
+    return _check(question, options, console)
+
+
+def _check(question: Question, options: argparse.Namespace, console: Console) -> int:
     from potto.checking.library import Library
 
     gc.disable()  # nearly all that a check makes stays, and collections would be a fifth of its time and more
     try:
         world = Library(["."])
-        status = _look(world, options, console)
+        status = _look(world, options, console, question)
     finally:
         gc.freeze()
         gc.enable()
@@ -40,18 +52,24 @@ def run(options: argparse.Namespace, console: Console) -> int:
     return status
 
 
-def _look(world: Library, options: argparse.Namespace, console: Console) -> int:
-    """Check all files once and say what was found."""
+def _look(world: Library, options: argparse.Namespace, console: Console, question: Question | None = None) -> int:
+    """Check all files once and say what was found; where that is nothing, keep it as the answer to the question."""
+    found, files = gather(world, options.paths)
+    _tell(found, files, world.source, options, console)
+    if not found and question is not None:
+        question.keep(files, world.db)
+    return int(any(located.diagnostic.severity == "error" for located in found))
+
+
+def _tell(found: list[Located], files: int, sources: Sources, options: argparse.Namespace, console: Console) -> None:
     from potto.reports.render import all_to_json, summary
 
-    found, files = gather(world, options.paths)
     if options.json:
-        console.answer_json(all_to_json(found, world.source))
+        console.answer_json(all_to_json(found, sources))
     else:
-        console.diagnostics(found, world.source, to_answer=True, inline_header=True)
+        console.diagnostics(found, sources, to_answer=True, inline_header=True)
         count = f"{files} file{'' if files == 1 else 's'}"
         console.complain(f"{count}: {summary(found) or 'no problems'}")
-    return int(any(located.diagnostic.severity == "error" for located in found))
 
 
 def gather(world: Library, paths: list[str]) -> tuple[list[Located], int]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import argparse
 import gc
 import importlib
+import os
 import sys
 from collections.abc import Callable
 from typing import Any, NoReturn
@@ -29,6 +30,25 @@ class _Parser(argparse.ArgumentParser):
         raise SystemExit(2)
 
 
+class _Formatter(argparse.RawDescriptionHelpFormatter):
+    """Help as wide as the screen. argparse asks for that whenever an option is added, by way of shutil and all that
+    unpacks archives."""
+
+    def __init__(self, prog: str) -> None:
+        super().__init__(prog, width=_columns() - 2)
+
+
+def _columns() -> int:
+    try:
+        return int(os.environ.get("COLUMNS", "")) or 80
+    except ValueError:
+        pass
+    try:
+        return os.get_terminal_size(sys.stdout.fileno()).columns or 80
+    except (OSError, ValueError):
+        return 80
+
+
 def dispatch(arguments: list[str]) -> int:
     """Find the command, parse its arguments, run it."""
     if arguments and arguments[0] in COMMANDS:
@@ -36,7 +56,10 @@ def dispatch(arguments: list[str]) -> int:
         module = importlib.import_module(module_of(arguments[0]))
         parser = _command_parser(arguments[0], module)
         prepare: Callable[[list[str]], list[str]] = getattr(module, "prepare", list)
-        options = parser.parse_intermixed_args(prepare(arguments[1:]))
+        words = prepare(arguments[1:])
+        # Words that options stand between take a second look, for which the usage is written out first.
+        parse = parser.parse_intermixed_args if any(word.startswith("-") for word in words) else parser.parse_args
+        options = parse(words)
         run: Callable[[argparse.Namespace, Console], int] = module.run
         console = standard_console(options.color)
         status = run(options, console)
@@ -77,7 +100,7 @@ def _command_parser(name: str, module: Any) -> argparse.ArgumentParser:
         prog=f"potto {name}",
         description=module.SUMMARY,
         epilog=f"example:\n{module.EXAMPLE}",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+        formatter_class=_Formatter,
         allow_abbrev=False,
     )
     module.configure(parser)

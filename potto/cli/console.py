@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import sys
 from collections.abc import Iterable, Iterator
@@ -44,6 +43,8 @@ class Console(Struct):
 
     def answer_json(self, value: Any) -> None:
         """The answer as one JSON object on one line."""
+        import json
+
         self.answer(json.dumps(value, ensure_ascii=False, allow_nan=False))
 
     def complain(self, text: str) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import difflib
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +14,7 @@ from potto.cli.console import Console
 from potto.cli.numbers import accounts, add_options, settings_of, show_stats
 
 if TYPE_CHECKING:
+    from potto.checking.recalled import Question
     from potto.evaluating.world import World
     from potto.python.slopes import Gradient
 
@@ -42,6 +42,27 @@ def run(options: argparse.Namespace, console: Console) -> int:
 
 
 def _symbols(options: argparse.Namespace, console: Console) -> int:
+    from potto.checking.recalled import Question
+
+    form = "json" if options.json else "typeset" if options.typeset or console.for_a_screen else "text"
+    question = Question(("deriv", options.name, form), (options.file,))
+    known = None if options.set else question.recalled()
+    if known is None:
+        return _found_symbols(question, form, options, console)
+    _tell_symbols(known, console)
+    return 0
+
+
+def _tell_symbols(found: str | dict[str, Any], console: Console) -> None:
+    if isinstance(found, str):
+        console.answer(found)
+    else:
+        console.answer_json(found)
+
+
+def _found_symbols(question: Question, form: str, options: argparse.Namespace, console: Console) -> int:
+    import difflib
+
     from potto.checking.facts import derivative_facts
     from potto.checking.library import NO_SUCH_DEFINITION, NOWHERE, Library
     from potto.cli.opening import fail, others_json, report_others
@@ -67,11 +88,16 @@ def _symbols(options: argparse.Namespace, console: Console) -> int:
             raise ProgramError([Located(options.file, complaint)], lambda name: None)
     except ProgramError as error:
         return fail(error, options, console)
-    if options.json:
-        console.answer_json({**to_builtins(facts), **others_json(world, file)})
+    told: str | dict[str, Any]
+    if form == "json":
+        told = {**to_builtins(facts), **others_json(world, file)}
     else:
-        console.answer(facts.typeset if options.typeset or console.for_a_screen else facts.text)
-    return report_others(world, file, options, console)
+        told = facts.typeset if form == "typeset" else facts.text
+    _tell_symbols(told, console)
+    status = report_others(world, file, options, console)
+    if not (status or options.set):
+        question.keep(told, world.db)
+    return status
 
 
 # In numbers

@@ -6,7 +6,6 @@ subterms are told by identity; the digest of its content is only made when someb
 
 from __future__ import annotations
 
-import hashlib
 import threading
 import weakref
 from collections.abc import Iterator
@@ -14,6 +13,8 @@ from typing import Any, TypeVar
 
 from msgspec import Struct
 from msgspec.structs import force_setattr
+
+from potto.digests import blake2b
 
 
 class Base(Struct, frozen=True, eq=False, weakref=True):
@@ -96,7 +97,7 @@ def _digested(term: Base) -> bytes:
         fed = [type(node).__name__.encode()]
         for value in values:
             _feed(value, fed)
-        force_setattr(node, "_digest", hashlib.blake2b(b"\x00".join(fed), digest_size=16).digest())
+        force_setattr(node, "_digest", blake2b(b"\x00".join(fed), digest_size=16).digest())
     assert term._digest is not None
     return term._digest
 

@@ -47,14 +47,9 @@ def unpacked(data: bytes) -> Any:
         raise ValueError(f"these bytes are not a value: {error}") from None
 
 
-def keeping() -> bool:
-    """Whether values are kept at all."""
-    return store.cache_folder() is not None
-
-
 def keep(kind: str, key: bytes, value: object) -> None:
     """Keep a value on disk under a key; one that is no data is not kept."""
-    if keeping():
+    if store.is_on():
         with suppress(TypeError, RecursionError):
             store.put(kind, key, packed(value))
 

@@ -7,7 +7,6 @@ are not there. What a file holds is kept in memory under the digest of its conte
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from hashlib import blake2b
 from pathlib import Path
 
 from msgspec import Struct
@@ -19,6 +18,7 @@ from potto.data.mistakes import NO_PACKAGE, UNKNOWN_KIND, UNREADABLE, DataMistak
 from potto.data.tables import separated
 from potto.data.texts import text_of
 from potto.data.values import Shape, Value, shape
+from potto.digests import blake2b
 
 
 class _Kind(Struct, frozen=True):

@@ -14,7 +14,8 @@ from collections.abc import Iterator, Sequence
 from msgspec import Struct
 
 from potto.checking.check import absolute
-from potto.evaluating.world import Answer, World
+from potto.evaluating.answering import Answer
+from potto.evaluating.world import World
 from potto.modules import DefinitionTarget, chunk_start, definition, imports, names, resolve, statements
 from potto.modules.builtins import is_builtin
 from potto.modules.kinds import HIDES_BUILTIN

@@ -18,17 +18,17 @@ from msgspec.structs import replace
 from potto.calculus.explanation.fields import named_fields, parameter_types
 from potto.checking.check import absolute, definition_diagnostics, has_errors
 from potto.checking.library import Library
-from potto.core.terms import Proj, Term, postorder
+from potto.core.terms import Global, Proj, Term, postorder, reached
 from potto.diagnostics import Diagnostic, PottoError, Related
 from potto.elaborate import core, elaborate_expression
+from potto.evaluating.answering import EXPRESSION, Answer, Checked, estimate_of, remarked
 from potto.kernels.cells import Value
 from potto.modules import chunk_start
 from potto.projects.settings import Settings, current
 from potto.reports.render import Located, ProgramError
-from potto.runtime.answers.estimate import Estimate
-from potto.runtime.answers.shown import as_dual, gives_dual, named_answer
+from potto.runtime.answers.records import has_records, named_answer
 from potto.runtime.evaluate import Program
-from potto.runtime.script import Script, Shown, placed, remarks
+from potto.runtime.script import Script, Shown, placed
 from potto.source import SourceText, Span
 from potto.syntax import parse_expression
 from potto.syntax.nodes import Expr
@@ -36,18 +36,9 @@ from potto.types import format_type, infer_expression, interface
 from potto.types.kinds import NO_TANGENT
 from potto.types.types import Type
 
-EXPRESSION = "<expression>"
 T = TypeVar("T")
 # Texts that were never on disk are found by functions of other worlds as well, under keys that are given once.
 _owners: weakref.WeakValueDictionary[str, World] = weakref.WeakValueDictionary()
-
-
-class Answer(Struct, frozen=True):
-    """What an expression evaluates to, its type, and what a reader should know about the number."""
-
-    estimate: Estimate
-    type: str
-    remarks: tuple[Located, ...] = ()
 
 
 class World(Library):
@@ -99,7 +90,7 @@ class World(Library):
         if getattr(self._local, "revision", None) != revision:
             self._local.revision = revision
             self._local.memory = {}
-            self._local.program = Program(self.lookup, self._held, self._place, self._with_fields)
+            self._local.program = Program(self.lookup, self._held, self._place, self.with_fields)
 
     def _place(self, met: Sequence[object], definitions: Mapping[tuple[str, str], Term]) -> Related | None:
         """Where in a definition that which was met first was written: in the one whose function was met as well, or the
@@ -121,7 +112,7 @@ class World(Library):
         ready = self.program.linker.ready
         return min((span for term, span in origins if met in postorder(ready(term))), key=len, default=None)
 
-    def _with_fields(self, term: Term, definitions: Mapping[tuple[str, str], Term]) -> Term:
+    def with_fields(self, term: Term, definitions: Mapping[tuple[str, str], Term]) -> Term:
         """A term that evaluation met with the fields of records as names: as the definition knows them that holds it,
         or all that have parameters of these names, where they agree."""
         wanted = {name for node in postorder(term) if isinstance(node, Proj) for name in node.free}
@@ -185,11 +176,8 @@ class World(Library):
         inferred = infer_expression(self.db, file, parsed.expr)
         self._stop(inferred.diagnostics, sources)
         elaborated = elaborate_expression(self.db, file, parsed.expr)
-        chosen = settings or current(self.settings(file))
         try:
-            estimate = self.program.evaluate(elaborated.term, chosen)
-            if gives_dual(elaborated.term, self.program.linker):
-                estimate = as_dual(estimate)
+            estimate = estimate_of(self.program, elaborated.term, settings or current(self.settings(file)))
             estimate = named_answer(estimate, inferred.type)
         except ProgramError:
             raise
@@ -198,9 +186,23 @@ class World(Library):
             place = own or Span(0, len(text))
             raise ProgramError([Located(EXPRESSION, placed(d, place, 0)) for d in error.diagnostics], sources) from None
         warned = [absolute(self.db, EXPRESSION, d, 0) for d in inferred.diagnostics if d.code == NO_TANGENT.code]
-        found = [*warned, *remarks(estimate, Span(0, len(text)))]
-        said = tuple(Located(EXPRESSION, d) for d in found)
+        said = (*(Located(EXPRESSION, d) for d in warned), *remarked(estimate, len(text)))
         return Answer(estimate, format_type(inferred.type), said)
+
+    def checked(self, file: str, text: str) -> Checked | None:
+        """What an expression that was evaluated, and says nothing wrong, is evaluated from; None where it gives records
+        or there is something to say about its text."""
+        parsed = parse_expression(text)
+        inferred = infer_expression(self.db, file, parsed.expr)
+        if parsed.diagnostics or inferred.diagnostics or has_records(inferred.type):
+            return None
+        term = elaborate_expression(self.db, file, parsed.expr).term
+        every = {node for parts in reached(term, resolve=self._resolve) for node in parts if isinstance(node, Global)}
+        definitions = {(name.module, name.name): self._resolve(name) for name in every}
+        return Checked(term, definitions, format_type(inferred.type), len(text))
+
+    def _resolve(self, name: Global) -> Term:
+        return self.lookup(name.module, name.name)
 
     def typed(self, file: str, text: str) -> tuple[Expr, Type]:
         """The tree of an expression with a file's names in scope, and its type. Raises ProgramError."""

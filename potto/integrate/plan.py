@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from msgspec import Struct
@@ -46,11 +46,13 @@ from potto.core.terms import (
     var,
     with_integrand,
 )  # fmt: skip
-from potto.integrate.fixed.boxes.sides import Box, box_of
 from potto.integrate.fixed.straight import StraightIntegral, straight
 from potto.integrate.levels import Group, LevelPlan
 from potto.integrate.outline import Outline, Outlines, outlined
 from potto.kernels.cells import Mask, Trace
+
+if TYPE_CHECKING:
+    from potto.integrate.fixed.boxes.sides import Box
 
 
 class Plan(Struct, frozen=True, dict=True):
@@ -137,6 +139,8 @@ class Plan(Struct, frozen=True, dict=True):
     @cached_property
     def box(self) -> Box | None:
         """How members of a batch are recognized that no surface cuts, where that can be told."""
+        from potto.integrate.fixed.boxes.sides import box_of  # loaded for large batches
+
         return None if self.inlined is None else box_of(self.term, self.surfaces, self.body, self.inlined)
 
     @cached_property

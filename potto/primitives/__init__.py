@@ -4,13 +4,13 @@ Owns nothing itself: importing it registers every entry, file by file, in `PRIMI
 entry says.
 """
 
+import os
 from importlib import import_module
-from pathlib import Path
 
 from potto.primitives.registry import EXACT, EXPONENT, PRIMITIVES, UNDOES, Primitive, register
 
-for _file in sorted(Path(__file__).parent.glob("*.py")):
-    if _file.stem != "__init__":
-        import_module(f"{__name__}.{_file.stem}")
+for _file in sorted(os.listdir(os.path.dirname(__file__))):
+    if _file.endswith(".py") and _file != "__init__.py":
+        import_module(f"{__name__}.{_file.removesuffix('.py')}")
 
 __all__ = ["EXACT", "EXPONENT", "PRIMITIVES", "UNDOES", "Primitive", "register"]

@@ -25,7 +25,6 @@ from potto.diagnostics import Diagnostic, Severity, declare
 from potto.projects.settings import DEFAULTS, Settings, problem
 from potto.projects.toml_places import entry_at, mistake_at
 from potto.reports.near import did_you_mean, instead, near_names
-from potto.reports.pages import codes
 from potto.reports.render import Located
 from potto.source import Span
 
@@ -177,6 +176,8 @@ class _Reader:
         return found
 
     def _no_lint(self, code: str) -> None:
+        from potto.reports.pages import codes
+
         if code in codes():
             told = f"`lints`: {code} is not a lint, so its severity cannot be changed; lints are {_listed(LINTS)}"
             self.problems.append(BAD_PROJECT(entry_at(self._text, "lints", code)[0], told))

@@ -21,7 +21,8 @@ from potto.python.at_once import AtOnce, Together, at_once, together
 from potto.python.tiles import LEAST
 from potto.reports.render import Located, ProgramError
 from potto.runtime.answers.estimate import Estimate
-from potto.runtime.answers.shown import as_dual, gives_dual, named_answer
+from potto.runtime.answers.records import named_answer
+from potto.runtime.answers.shown import as_dual, gives_dual
 from potto.runtime.evaluate import Clock, report
 from potto.runtime.evaluation.machine import Machine
 from potto.source import Span

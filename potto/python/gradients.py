@@ -33,8 +33,7 @@ from potto.python.sided import with_sides
 from potto.python.slopes import Gradient, Slopes
 from potto.python.tiles import LEAST
 from potto.runtime.answers.estimate import Estimate
-from potto.runtime.answers.named import named
-from potto.runtime.answers.shown import named_answer
+from potto.runtime.answers.records import named, named_answer
 from potto.runtime.evaluate import Clock, bar, number, report, told
 from potto.runtime.evaluation.derivatives.sides import as_a_whole
 from potto.runtime.evaluation.machine import Machine

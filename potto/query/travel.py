@@ -12,10 +12,10 @@ here, so nothing is ever taken over that would not have been found here.
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Sequence
-from hashlib import blake2b
 from importlib import import_module
 from typing import Any
 
+from potto.digests import blake2b
 from potto.query.database import Database
 from potto.query.nodes import Input, MappingEntry, Memo, Node, Query, entry_of
 from potto.quick import quick, value

@@ -15,7 +15,7 @@ import numpy as np
 
 from potto.calculus.surfaces.discontinuities import TooDeep
 from potto.core.printer import abridged, format_term
-from potto.core.terms import Data, Integral, Sum, Term
+from potto.core.terms import Data, Fold, Integral, Sum, Term
 from potto.diagnostics import PottoError, Related
 from potto.integrate.events import BOUNDLESS, INFINITE, NO_VALUE, NOT_A_NUMBER, ROUGH, STEEP, Shortfall
 from potto.kernels import errors
@@ -36,7 +36,6 @@ from potto.runtime.evaluation.arrays import array, element, length
 from potto.runtime.evaluation.derivatives.duals import call_derivative, call_paired
 from potto.runtime.evaluation.derivatives.kinks import note_kink
 from potto.runtime.evaluation.few_members import told_alone
-from potto.runtime.evaluation.folds.folds import fold
 from potto.runtime.evaluation.functions import Closure, Derivative
 from potto.runtime.evaluation.linker import Linker, Named
 from potto.runtime.evaluation.machine import Machine, Semantics
@@ -65,6 +64,12 @@ def _loaded(term: Data) -> Value:
     return loaded(term)
 
 
+def _fold(machine: Machine, term: Fold, lo: Value, hi: Value, start: Value, env: dict[str, Value]) -> Value:
+    from potto.runtime.evaluation.folds.folds import fold
+
+    return fold(machine, term, lo, hi, start, env)
+
+
 def _culled(machine: Machine, term: Sum, first: int, last: int, env: dict[str, Value]) -> Value | None:
     from potto.runtime.integration.preparation.culling import culled
 
@@ -78,7 +83,7 @@ def _added(machine: Machine, terms: tuple[Term, ...], env: dict[str, Value]) -> 
 
 
 SEMANTICS = Semantics(
-    call_derivative, call_paired, chosen, lazy, _added, total, _culled, array, element, length, _loaded, fold,
+    call_derivative, call_paired, chosen, lazy, _added, total, _culled, array, element, length, _loaded, _fold,
     _integral, note_kink,
 )  # fmt: skip
 

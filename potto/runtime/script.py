@@ -6,17 +6,14 @@ an error ends the run, a warning does not. Names of loops and of local assignmen
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
-from typing import Any
 
 from msgspec import Struct
 from msgspec.structs import replace
 
 from potto.checking.spoiled import statement_errors
-from potto.diagnostics import Diagnostic, PottoError, declare
+from potto.diagnostics import Diagnostic, PottoError
 from potto.elaborate import elaborate_expression
-from potto.integrate.events import DIVERGENT, ROUGH, UNDEFINED
 from potto.kernels.cells import Env, Rows, Value
 from potto.kernels.errors import wrong_call
 from potto.modules import statements
@@ -25,8 +22,9 @@ from potto.projects.settings import Settings
 from potto.query import Database
 from potto.reports.render import Located, ProgramError
 from potto.runtime.answers.estimate import Estimate
-from potto.runtime.answers.named import named
-from potto.runtime.answers.shown import as_dual, format_answer, format_value, gives_dual, named_answer
+from potto.runtime.answers.records import named, named_answer
+from potto.runtime.answers.remarks import remarks
+from potto.runtime.answers.shown import as_dual, format_answer, format_value, gives_dual
 from potto.runtime.evaluate import Clock, Program, report
 from potto.runtime.evaluation.functions import Closure
 from potto.runtime.evaluation.machine import Machine
@@ -34,10 +32,6 @@ from potto.source import Span
 from potto.syntax import nodes
 from potto.types import infer_expression
 from potto.types.types import ArrayOf, TupleOf, Type, Unknown
-
-NOT_CONVERGED = declare("P0501", "an estimate that is not as accurate as was asked", "warning")
-NO_NUMBER = declare("P0524", "an answer that is not a number", "warning")
-ONE_SIDED = declare("P0522", "a derivative that differs on the two sides of the parameters", "info")
 
 Types = tuple[tuple[str, Type], ...]  # of the names of an environment
 
@@ -176,34 +170,6 @@ def placed(diagnostic: Diagnostic, place: Span, start: int) -> Diagnostic:
     if len(diagnostic.span):
         return moved(diagnostic, start)
     return replace(diagnostic, span=place)
-
-
-def remarks(estimate: Estimate, place: Span) -> Iterator[Diagnostic]:
-    """What a reader of a number should know: that it is not accurate enough, that its derivative is one-sided."""
-    if (_has_nan(estimate.value) or _has_nan(estimate.tangent)) and DIVERGENT.isdisjoint(estimate.shortfalls):
-        why = [shortfall for shortfall in estimate.shortfalls if shortfall.alike == UNDEFINED]
-        yield NO_NUMBER(
-            place,
-            f"this is not a number: {'; '.join(map(str, why))}" if why else "this is not a number",
-            help=why[0].advice
-            if why
-            else "a builtin was used where it is not defined, or a parameter is not a number itself",
-        )
-    elif not estimate.converged and {*estimate.shortfalls} != {ROUGH}:
-        reason = "; ".join(estimate.reasons)
-        yield NOT_CONVERGED(
-            place,
-            f"this estimate did not reach the accuracy asked for: {reason}",
-            help=estimate.options,
-        )
-    for note in estimate.notes:
-        yield ONE_SIDED(place, str(note))
-
-
-def _has_nan(value: Any) -> bool:
-    if isinstance(value, tuple | list):
-        return any(map(_has_nan, value))
-    return value is not None and math.isnan(value)
 
 
 def _has_functions(value: Value) -> bool:

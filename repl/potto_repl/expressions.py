@@ -11,7 +11,7 @@ from typing import cast
 from msgspec import Struct
 
 from potto.checking.check import absolute
-from potto.evaluating.world import EXPRESSION
+from potto.evaluating.answering import EXPRESSION
 from potto.reports.render import Located, ProgramError
 from potto.syntax import nodes, print_expression
 from potto.types import Type, infer_expression

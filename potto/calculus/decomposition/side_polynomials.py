@@ -11,7 +11,6 @@ as any other side is: a polynomial that is 0 there is 0 everywhere, but by chanc
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from hashlib import blake2b
 
 from potto.calculus.algebra.point_values import sample_value
 from potto.calculus.inlining.currying import arguments_of, sizes_of, uncurry
@@ -41,6 +40,7 @@ from potto.core.terms import (
     var,
 )
 from potto.core.walking import Holding
+from potto.digests import blake2b
 
 Path = tuple[int, ...]
 Sides = Mapping[Path, tuple[str, int]]  # the name of a side, and 1 or -1 for a branch taken there or on the other

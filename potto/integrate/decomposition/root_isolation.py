@@ -9,12 +9,12 @@ too many cells, is told.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from hashlib import blake2b
 
 import numpy as np
 from msgspec import Struct
 
 from potto.core.terms import Branch, Proj, Term, Var, children, postorder, rebuild, var
+from potto.digests import blake2b
 from potto.integrate.rules.intervals import Interval, everywhere
 from potto.integrate.rules.lowered_intervals import enclosures
 from potto.kernels.cells import Array, Bools, Cell, Ints, Number, Value

@@ -1,15 +1,13 @@
 """Records as answers: tuples that know the names of their parts, and are shown as programs write them.
 
-Owns `Named`, which `named` makes by a type and `alike` of another one, and `WithFields` for answers that may be such.
-What is evaluated is tuples; the type of an answer says which of them are records.
+Owns `Named`, which `records` makes by a type and `alike` of another one, and `WithFields` for answers that may be such.
+What is evaluated is tuples.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from typing import Any
-
-from potto.types.types import ArrayOf, TupleOf, Type
 
 
 class Named(tuple[Any, ...]):
@@ -59,33 +57,3 @@ class WithFields:
 
     def __dir__(self) -> list[str]:
         return [*super().__dir__(), *getattr(self._parts, "fields", ())]
-
-
-def named(value: Any, type: Type) -> Any:
-    """A value of a type, with what is a record in it by its names; also one whose records are dicts."""
-    if not has_records(type):
-        return value
-    if isinstance(value, dict) and isinstance(type, TupleOf) and type.record is not None:
-        value = tuple([value[field] for field in type.record.fields])
-    if isinstance(type, TupleOf) and isinstance(value, tuple) and len(value) == len(type.items):
-        parts = [named(part, item) for part, item in zip(value, type.items, strict=True)]
-        return tuple(parts) if type.record is None else Named(_called(type.record.name), type.record.fields, parts)
-    if isinstance(type, ArrayOf) and isinstance(value, list):
-        return [named(item, type.item) for item in value]
-    return value
-
-
-def has_records(type: Type) -> bool:
-    """Whether what is of a type is a record, or has some in it."""
-    match type:
-        case TupleOf(items=items, record=record):
-            return record is not None or any(map(has_records, items))
-        case ArrayOf(item=item):
-            return has_records(item)
-        case _:
-            return False
-
-
-def _called(name: str) -> str:
-    """What a program calls a record; the columns of a file have no name that it could write."""
-    return name if name.isidentifier() else ""

@@ -18,7 +18,7 @@ from potto.integrate.events import BOUNDLESS
 from potto.kernels.cells import Cell, Rows, Value
 from potto.runtime.answers.convergence import converged_members, steep
 from potto.runtime.answers.estimate import Estimate
-from potto.runtime.answers.named import Named, has_records, named
+from potto.runtime.answers.named import Named
 from potto.runtime.answers.printing import (
     MOST_ITEMS,
     format_bounds,
@@ -30,7 +30,6 @@ from potto.runtime.answers.printing import (
 )
 from potto.runtime.evaluation.functions import Derivative
 from potto.runtime.evaluation.linker import Linker
-from potto.types.types import TupleOf, Type
 
 NOTHING: Mapping[str, Value] = MappingProxyType({})
 
@@ -88,16 +87,6 @@ def pair(estimate: Estimate) -> tuple[Any, Any]:
 def format_estimate(estimate: Estimate) -> str:
     """The digits of an answer that hold, a dual as `(value, tangent)`: as a program may write them."""
     return estimate.text if estimate.text is not None else format_numbers(*pair(estimate))
-
-
-def named_answer(estimate: Estimate, type: Type) -> Estimate:
-    """An answer of a type, with what is a record in it by its names; a dual is one of a pair."""
-    if not has_records(type):
-        return estimate
-    value = tangent = type
-    if estimate.tangent is not None and isinstance(type, TupleOf) and type.dual:
-        value, tangent = type.items
-    return replace(estimate, value=named(estimate.value, value), tangent=named(estimate.tangent, tangent))
 
 
 # For machines

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from msgspec import Struct
 
 from potto.calculus.differentiation.deltas import PRODUCT_OF_DELTAS
 from potto.calculus.inlining.currying import sizes_of
@@ -61,8 +62,7 @@ WATCHING: ContextVar[Callable[[Lam, list[Value]], None] | None] = ContextVar("WA
 """Who is told of each term that is evaluated over a batch, and at what places: pictures show nodes so."""
 
 
-@dataclass(frozen=True)
-class Semantics:
+class Semantics(Struct, frozen=True):
     """What is done by more than kernels: derivatives called, conditionals with one side taken, sums, integrals.
 
     derivative: of a function, called with duals; paired: a function on duals that was written by hand. added: summands

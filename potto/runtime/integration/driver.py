@@ -29,8 +29,8 @@ from potto.runtime.evaluation.local import locally
 from potto.runtime.evaluation.machine import Machine
 from potto.runtime.evaluation.selection import Pick, apart
 from potto.runtime.integration.derivatives.rims import note_rims
+from potto.runtime.integration.methods.choices import SAMPLED
 from potto.runtime.integration.methods.members import Whole
-from potto.runtime.integration.methods.summands import SAMPLED
 from potto.runtime.integration.preparation.arrays import Differ, Read, as_written, in_numbers, met, without_arrays
 from potto.runtime.integration.preparation.prepared import filled, held, placed, prepared
 from potto.runtime.integration.preparation.taken_apart import together

@@ -13,18 +13,18 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from msgspec import Struct
 
+from potto import store
 from potto.calculus.algebra.point_values import sample_value
 from potto.calculus.inlining.deciding import deciding
-from potto.core.packing import keep, keeping, recall
+from potto.core.packing import keep, recall
 from potto.core.terms import Deriv, Integral, Lam, Term, Var, deriv, substitute, var
 from potto.diagnostics import PottoError
 from potto.integrate.columns import run_of
-from potto.integrate.elimination.recursion import Eliminated, eliminated
 from potto.integrate.events import Events
 from potto.integrate.pieces import Sums, still
 from potto.integrate.plan import Plan, inlined, make, numbers_in, unpacked_plan
@@ -33,6 +33,9 @@ from potto.kernels.making import making
 from potto.runtime.evaluation.functions import Closure, Derivative
 from potto.runtime.evaluation.machine import Machine
 from potto.runtime.integration.preparation.known_sides import Sided, sided
+
+if TYPE_CHECKING:
+    from potto.integrate.elimination.recursion import Eliminated
 
 MOST_INTEGRALS = 1024
 MOST_LOOKED_AT = 8  # members that are each asked on which sides they lie
@@ -238,7 +241,7 @@ class Problem:
             plan = make(self.term, self.function, self.decided, self.plain_function, _Sampled(self), outlines)
         known.append(plan)
         # Each as it was made: evaluation adds to what a plan knows, in forms that are for this process alone.
-        if keeping():
+        if store.is_on():
             with suppress(TypeError):  # what is no data is not kept
                 self.known.packed.append(plan.packed())
                 keep("plans", self.known.key, self.known.packed)
@@ -262,6 +265,8 @@ class Problem:
         """The steps of an integral over many variables that each depend on one number, if it has such; found once."""
         known = self.known.steps
         if not known:
+            from potto.integrate.elimination.recursion import eliminated
+
             with making:
                 known.append(eliminated(self.term, self.plain_function))
         return known[0]

@@ -10,7 +10,7 @@ from msgspec.structs import replace
 
 from potto.checking.check import absolute
 from potto.elaborate import elaborate_expression
-from potto.evaluating.world import EXPRESSION
+from potto.evaluating.answering import EXPRESSION
 from potto.kernels.making import counts
 from potto.projects.settings import Settings
 from potto.reports.render import Located, ProgramError

@@ -17,7 +17,7 @@ from potto.integrate.fixed.cells.nodes import at_once
 from potto.integrate.fixed.cells.topologies import Alike
 from potto.integrate.fixed.lowered.cells import LoweredCells, Wanted, lowered_cells
 from potto.integrate.fixed.lowered.rule_text import RuleText
-from potto.integrate.fixed.lowered.total_text import ELSEWHERE, TotalText
+from potto.integrate.fixed.lowered.total_text import ELSEWHERE, TRACKED, TotalText
 from potto.integrate.fixed.moving_sums import SUMMED
 from potto.integrate.fixed.straight import StraightIntegral
 from potto.integrate.pieces import Evaluator
@@ -25,8 +25,6 @@ from potto.integrate.rules.gauss import analytic_truncation, telling
 from potto.kernels.cells import Array, Bools, Ints, Value
 
 STRAIGHT = (False, False)  # no end of a stretch is like a square root
-# At how many nodes rounding is followed at each; at a few of them, where there are more.
-TRACKED = 1 << 12
 # How many times larger than at all nodes the integrand may be at the ends of stretches: else something narrow is there.
 PEAK = 8.0
 # A rule is good enough for a cell if what it may be off is this part of the accuracy asked for; for a few members, whom

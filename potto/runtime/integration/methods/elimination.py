@@ -1,19 +1,22 @@
 """Integrals over many variables by eliminating these one after the other, where that does.
 
-Owns `step_by_step` and `eliminated`.
+Owns `step_by_step` and `eliminated`. What eliminates is loaded when there is something to eliminate.
 """
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from potto.calculus.decomposition.elimination import eliminable
-from potto.integrate.elimination.recursion import AFFORDABLE, Eliminated, one_by_one
 from potto.integrate.events import Fold
 from potto.integrate.pieces import Sums
-from potto.runtime.integration.derivatives.one_sided import beside_folds
 from potto.runtime.integration.methods.attempts import Attempt, accurate
 from potto.runtime.integration.problem import Problem
+
+if TYPE_CHECKING:
+    from potto.integrate.elimination.recursion import Eliminated
 
 # How accurate the answer must be, relatively, instead of that of iteration, and instead of that of samples.
 ACCURATE, WORTH = 1e-8, 1e-4
@@ -56,6 +59,8 @@ def _added(rows: list[Sums]) -> Sums:
 
 def _member(known: Eliminated, problem: Problem) -> Sums | None:
     """One integral, looked at from both sides where a surface folds in the outermost variable."""
+    from potto.integrate.elimination.recursion import AFFORDABLE, one_by_one
+    from potto.runtime.integration.derivatives.one_sided import beside_folds
 
     def tabled(there: Problem) -> Sums:
         rows = []

@@ -1,6 +1,7 @@
 """Iterated quadrature of a batch by one plan: whole boxes first, the rest cut, so many members at a time.
 
-Owns `in_parts`, `whole_boxes`, `cut_up` and `iterated`.
+Owns `in_parts`, `whole_boxes`, `cut_up` and `iterated`. Each loads what it rests on when it first runs: most integrals
+of a program are settled before any of them, and these are an eighth of the evaluator.
 """
 
 from __future__ import annotations
@@ -13,9 +14,6 @@ from typing import Any
 
 import numpy as np
 
-from potto.integrate.adaptive.iterated import Iteration
-from potto.integrate.fixed.boxes.uncut import uncut
-from potto.integrate.fixed.cells.alike import by_shapes
 from potto.integrate.pieces import Sums, gather
 from potto.integrate.plan import Plan
 from potto.kernels.cells import Bools, Ints, Value
@@ -50,6 +48,8 @@ def whole_boxes(plan: Plan, machine: Machine, env: dict[str, Value], batch: int)
     or nothing came of it."""
     if batch < FEW or plan.box is None:
         return None
+    from potto.integrate.fixed.boxes.uncut import uncut
+
     with one_thread():
         found = uncut(plan.box, machine, env, batch)
     if found is not None and machine.costs is not None:
@@ -97,11 +97,15 @@ def _alike(
         return None
     if batch == 1 and len(plan.levels) - sum(d is not None for d in plan.degrees) > MOST_AXES:
         return None
+    from potto.integrate.fixed.cells.alike import by_shapes
+
     return by_shapes(plan.straight, plan.degrees, machine, env, batch, tight)
 
 
 def iterated(plan: Plan, machine: Machine, env: dict[str, Value], batch: int, start_order: int = START_ORDER) -> Sums:
     """Iterated quadrature with cuts."""
+    from potto.integrate.adaptive.iterated import Iteration
+
     if batch <= BATCH:
         return Iteration(plan, machine, start_order).whole(env, batch)
     with one_thread():
@@ -117,6 +121,8 @@ def iterated(plan: Plan, machine: Machine, env: dict[str, Value], batch: int, st
 
 def best_order(plan: Plan, machine: Machine, env: dict[str, Value], batch: int) -> int:
     """The number of nodes to start with that is the cheapest for a few members spread over the batch."""
+    from potto.integrate.adaptive.iterated import Iteration
+
     index = np.linspace(0, batch - 1, PILOTS).astype(np.int64)
     here = gather(env, index)
     costs = []

@@ -26,10 +26,10 @@ from potto.runtime.answers.allowances import NOTHING
 from potto.runtime.evaluation.functions import Closure, Derivative
 from potto.runtime.evaluation.machine import Machine
 from potto.runtime.evaluation.sums import CHUNK
+from potto.runtime.integration.methods.choices import SAMPLED
 from potto.runtime.integration.problem import linked
 
 Slots = tuple[int, ...]  # the directions in which a member moves
-SAMPLED = ("mc", "qmc")  # methods whose errors are no less for one summand than for many
 MOST_KNOWN = 256  # sums of which it is kept what is alike in them
 
 FUNCTION = "function"
