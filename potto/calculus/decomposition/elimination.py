@@ -13,17 +13,19 @@ a function of one number that can be tabulated, so that n variables take n times
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from fractions import Fraction
 from functools import lru_cache, partial, reduce
 
 from msgspec import Struct
+from msgspec.structs import replace
 
+from potto.calculus.decomposition.distributions import distributed
+from potto.calculus.decomposition.factors import Names, factors, summands
 from potto.core.collecting import split
 from potto.core.polynomials import number
 from potto.core.terms import (
     ONE,
-    ZERO,
     App,
     Branch,
     Const,
@@ -36,7 +38,6 @@ from potto.core.terms import (
     add,
     branch,
     children,
-    div,
     integral,
     mul,
     neg,
@@ -50,12 +51,19 @@ from potto.core.terms import (
 
 MOST_ORDERED = 4  # variables that are tried in every order
 MOST_SUMMANDS = 8
-Names = frozenset[str]
-Scaled = Callable[[Term], Term]
+
+
+class Distribution(Struct, frozen=True):
+    """A number of variables that count through it alone: its density is the sum of what these steps of other integrals
+    come to, each from the number as its state."""
+
+    number: Term
+    over: Integral
+    densities: tuple[tuple[Integral, tuple[EliminationStep, ...]], ...]
 
 
 class EliminationStep(Struct, frozen=True):
-    """V(state) = integral over [lo, hi] of weight * V_next(passed) d(variable).
+    """V(state) = integral over [lo, hi] of weight * V_next(passed) d(variable), of which the density is a factor.
 
     state: the name of the number that is handed on from further out; None where there is none. passed: the number that
     is handed on further in; None where what is further in depends on none, and for the last variable, whose weight is
@@ -68,6 +76,7 @@ class EliminationStep(Struct, frozen=True):
     state: str | None
     weight: Term
     passed: Term | None
+    density: Distribution | None = None
 
 
 class _MoreThanOne(Exception):
@@ -76,9 +85,24 @@ class _MoreThanOne(Exception):
 
 @lru_cache(maxsize=1024)
 def eliminate(term: Integral) -> tuple[EliminationStep, ...] | None:
-    """The steps, outermost first, in the first order of the variables that does; None where in each of them more than
-    one number would have to be handed on."""
-    return next((steps for order in _orders(term) if (steps := _in_order(order)) is not None), None)
+    """The steps, outermost first, in the first order of the variables that does, or of fewer of them with a number in
+    the place of others; None where in each of them more than one number would have to be handed on."""
+    steps = _chain(term, None)
+    if steps is not None:
+        return steps
+    for way in distributed(term):
+        chains = [_chain(density, way.variable) for density in way.densities]
+        further = eliminate(way.term) if all(chain is not None for chain in chains) else None
+        if further is not None:
+            each = tuple((own, chain) for own, chain in zip(way.densities, chains, strict=True) if chain is not None)
+            known = Distribution(way.number, way.over, each)
+            return tuple(replace(step, density=known) if step.variable == way.variable else step for step in further)
+    return None
+
+
+def _chain(term: Integral, state: str | None) -> tuple[EliminationStep, ...] | None:
+    """The steps in the first order of the variables that does. state: a number that is known to begin with."""
+    return next((steps for order in _orders(term) if (steps := _in_order(order, state)) is not None), None)
 
 
 @lru_cache(maxsize=1024)
@@ -107,12 +131,12 @@ def _orders(term: Integral) -> Iterator[Integral]:
         yield reordered(term, list(order))
 
 
-def _in_order(term: Integral) -> tuple[EliminationStep, ...] | None:
+def _in_order(term: Integral, state: str | None) -> tuple[EliminationStep, ...] | None:
     everything = (term.body, *(bound for pair in term.bounds for bound in pair))
     kinds = (Const, Var, Prim, Branch, If, App, Global)
     if not all(isinstance(node, kinds) for part in everything for node in postorder(part)):
         return None
-    rest, bounds, state = _bare(term.body), list(term.bounds), None
+    rest, bounds = _bare(term.body), list(term.bounds)
     steps: list[EliminationStep] = []
     for i, variable in enumerate(term.variables):
         lo, hi = bounds[i]
@@ -158,70 +182,6 @@ def _split(term: Term, here: Names, inner: Names) -> tuple[Term, Term]:
                     factor = prim("exp", add(*(t for t in terms if t.free & inner)))
         rest.append(factor)
     return mul(*weight) if weight else ONE, mul(*rest) if rest else ONE
-
-
-def factors(term: Term) -> Iterable[Term]:
-    waiting = [term]
-    while waiting:
-        item = waiting.pop()
-        match item:
-            case Prim(op="mul", args=args):
-                waiting.extend(reversed(args))
-            case Prim(op="neg", args=(inside,)):
-                waiting.append(inside)
-                yield neg(ONE)
-            case Prim(op="div", args=(above, below)) if above is not ONE:
-                waiting.append(above)
-                yield from (div(ONE, factor) for factor in factors(below))
-            case Branch(then=then, orelse=orelse) if orelse is ZERO and then is not ONE:
-                waiting += (then, branch(item.coordinates, item.strict, ONE, ZERO))
-            case Branch(then=then, orelse=orelse) if then is ZERO and orelse is not ONE:
-                waiting += (orelse, branch(item.coordinates, item.strict, ZERO, ONE))
-            case Branch(then=then, orelse=orelse) if (
-                then is ONE and orelse is ZERO and len(every := _every(item.surface)) > 1
-            ):
-                waiting += (branch((surface,), item.strict, ONE, ZERO) for surface in every)
-            case _:
-                yield item
-
-
-def _every(surface: Term) -> list[Term]:
-    """The surfaces all of which must be on the upper side for one with a maximum or a minimum to be: c - max(a, b)."""
-    terms = surface.args if isinstance(surface, Prim) and surface.op == "add" else (surface,)
-    for place, term in enumerate(terms):
-        rest = (*terms[:place], *terms[place + 1 :])
-        match term:
-            case Prim(op="min", args=args):
-                return [add(*rest, arg) for arg in args]
-            case Prim(op="neg", args=(Prim(op="max", args=args),)):
-                return [add(*rest, neg(arg)) for arg in args]
-    return [surface]
-
-
-def summands(term: Term, names: Names) -> list[Term]:
-    """What a term is a sum of, that what has none of some variables is multiplied into."""
-    found: list[Term] = []
-    waiting: list[tuple[Term, tuple[Scaled, ...]]] = [(term, ())]
-    while waiting:
-        item, scaled = waiting.pop()
-        match item:
-            case Prim(op="add", args=args):
-                waiting.extend((a, scaled) for a in reversed(args))
-            case Prim(op="neg", args=(inside,)):
-                waiting.append((inside, (neg, *scaled)))
-            case Prim(op="mul", args=args) if sum(not a.free.isdisjoint(names) for a in args) == 1:
-                inside = next(a for a in args if not a.free.isdisjoint(names))
-                rest = mul(*(a for a in args if a is not inside))
-                waiting.append((inside, (partial(mul, rest), *scaled)))
-            case Prim(op="div", args=(inside, below)) if below.free.isdisjoint(names):
-                waiting.append((inside, (partial(_over, below), *scaled)))
-            case _:
-                found.append(reduce(lambda part, wrap: wrap(part), scaled, item))
-    return found
-
-
-def _over(below: Term, above: Term) -> Term:
-    return div(above, below)
 
 
 def _parts(node: Prim, names: Names) -> tuple[Callable[..., Term], list[Term]]:

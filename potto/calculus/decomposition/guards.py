@@ -8,7 +8,7 @@ what is integrated is seen to be a product.
 from __future__ import annotations
 
 from potto.calculus.algebra.ranges import range_of
-from potto.calculus.decomposition.elimination import factors
+from potto.calculus.decomposition.factors import factors
 from potto.core.terms import Hole, If, Integral, Prim, Term, if_, integral, mul, sub, transform
 
 

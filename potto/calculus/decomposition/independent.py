@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from functools import lru_cache
 
-from potto.calculus.decomposition.elimination import Names, factors, summands
+from potto.calculus.decomposition.factors import Names, factors, summands
 from potto.core.terms import ONE, Const, Delta, Integral, Prim, Term, add, integral, mul, postorder, prim
 
 # About how many nodes a variable takes, with ends and without; up to which product of them one rule for all variables,

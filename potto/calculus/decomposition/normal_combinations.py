@@ -16,7 +16,7 @@ from msgspec import Struct
 from potto.calculus.algebra.affine import affine
 from potto.calculus.algebra.ranges import range_of
 from potto.calculus.algebra.rational_form import is_zero
-from potto.calculus.decomposition.elimination import factors
+from potto.calculus.decomposition.factors import factors
 from potto.core.simplify import simplify
 from potto.core.terms import (
     INF,

@@ -1,13 +1,14 @@
 """Functions of one number as polynomials on pieces, with their tangents and errors.
 
-Owns `InterpolantTable` and `tabulated`. The pieces lie between the places where the function is not smooth, which are
-known and move with the parameters; each is halved until its Legendre coefficients say that the polynomial is as good as
-asked.
+Owns `InterpolantTable`, `tabulated` and `concentration`. The pieces lie between the places where the function is not
+smooth, which are known and move with the parameters; each is halved until its Legendre coefficients say that the
+polynomial is as good as asked.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from msgspec import Struct, field
@@ -24,6 +25,10 @@ ROUNDS, MOST = 40, 2000  # of halvings; pieces
 # How far apart neighbouring pieces may be where they meet, as a part of the largest value, beyond their errors.
 GAP = 1e-9
 BESIDE = 2.0**-40  # how far from its ends a piece is looked at, as a part of it: on them it may jump
+# What the coefficients that are left out may add up to, of the largest value, to be taken for rounding where it is
+# still this part of itself on half of a piece: of what is smooth it is 2^-16.
+NOISE, STUCK = 1e-12, 0.35
+TINY = np.finfo(float).tiny
 SEEN = 0.1  # of the largest value
 ROUNDED = 16  # how many roundings a number may be beyond the table that is on its end
 
@@ -97,7 +102,7 @@ def tabulated(
     count = segments.a.size
     todo = (np.arange(count), np.zeros(count), np.ones(count))
     done: list[tuple[Ints, Array, Array, Array, Array, Array]] = []
-    rule, largest, total = gauss(ORDER), np.zeros(2 + k), 0
+    rule, largest, total, parents = gauss(ORDER), np.zeros(2 + k), 0, np.full(count, np.inf)
     for turn in range(ROUNDS):
         coefficients, error, most = _measured(segments, todo, k, function, rule)
         if exhausted() or not np.isfinite(coefficients).all():
@@ -109,7 +114,10 @@ def tabulated(
         lost[0] = np.maximum(lost[0], _off_at_the_ends(segments, todo, coefficients[0], function, rule))
         # What is off on a short piece counts little, even where what passes on numbers crowds them there like a root.
         share = np.sqrt((todo[2] - todo[1]) * _lengths(segments)[todo[0]]) if even else 1.0
-        coarse = (lost * share > np.maximum(rtol * largest[:, None], error)).any(axis=0)
+        missed = lost * share
+        coarse = (missed > np.maximum(rtol * largest[:, None], error)).any(axis=0)
+        part = (missed / np.maximum(largest, TINY)[:, None]).max(axis=0)
+        coarse &= (part > NOISE) | (part < STUCK * parents)
         if turn + 1 == ROUNDS or total > MOST:
             rise = np.abs(coefficients[0] @ rule.ends @ (1.0, -1.0))
             if (coarse & (rise > GAP * largest[0])).any():
@@ -120,11 +128,27 @@ def tabulated(
         done.append((segment[fine], u0[fine], u1[fine], coefficients[:, fine], (error + lost)[:, fine], before[fine]))
         if not coarse.any():
             break
-        segment, u0, u1 = segment[coarse], u0[coarse], u1[coarse]
+        segment, u0, u1, parents = segment[coarse], u0[coarse], u1[coarse], np.tile(part[coarse], 2)
         middle = 0.5 * (u0 + u1)
         todo = (np.tile(segment, 2), np.concatenate((u0, middle)), np.concatenate((middle, u1)))
     table, inside = _joined(segments, done)
     return replace(table, largest=largest[0]) if _continuous(table, inside, rule, largest[0]) else None
+
+
+def concentration(tables: Sequence[InterpolantTable]) -> tuple[float, float]:
+    """The mean and the deviation of a number of whose density some tables are the sum."""
+    rule = gauss(ORDER)
+    back = np.polynomial.legendre.legvander(2 * rule.nodes - 1, ORDER - 1)
+    moments = np.zeros(3)
+    for table in tables:
+        u = table.u0[:, None] + (table.u1 - table.u0)[:, None] * rule.nodes
+        x, slope, _ = substitution.points(table.segments.pick(table.segment), u)
+        mass = np.abs(table.coefficients[0] @ back.T) * rule.weights * slope * (table.u1 - table.u0)[:, None]
+        moments += [(mass * x**power).sum() for power in range(3)]
+    if not moments[0] > 0:
+        return 0.0, 0.0
+    mean, square = moments[1:] / moments[0]
+    return float(mean), math.sqrt(max(square - mean * mean, 0.0))
 
 
 def _lengths(segments: Segments) -> Array:
