@@ -324,14 +324,14 @@ class _Run(Struct, dict=True):
         found = None
         if plan.line is not None and not (sides or self.iteration.still):
             found = by_shapes(plan.line, plan.degrees[-1:], machine, env, n, False)
-        done = np.zeros(n, dtype=bool) if found is None else found[0]
+        done = np.zeros(n, dtype=bool) if found is None else found.done
         rest = np.flatnonzero(~done)
         if found is not None and not rest.size:
-            return found[1]
+            return found.sums
         sides = {**self.turning(point, n), **sides}
         here = env if found is None else gather(env, rest)
         sums = self.iteration.run(self.drawn, here, rest.size, {g: take(m, rest) for g, m in sides.items()}, machine)
-        return sums if found is None else found[1].with_members(rest, sums)
+        return sums if found is None else found.sums.with_members(rest, sums)
 
     def turning(self, point: Point, n: int) -> dict[int, Mask]:
         """The sides, decided by what is drawn, that turn round those decided further in."""

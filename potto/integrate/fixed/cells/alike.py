@@ -1,10 +1,10 @@
 """Members of a batch whose cells are alike, by one product rule for all cells of a shape.
 
-Owns `by_shapes`. What `a_priori` does for one member, with orders that are proved, is done here for many at once, with
-orders that are proved for regions of parameters (`proved_shapes`), or that the Legendre coefficients at the nodes show
-to be enough. Nodes move with the ends of their cells (Reynolds' transport theorem), so that the tangents of the sums
-are the derivatives and no boundary term is left. Rounding is kept track of, as everywhere outside of integrals, at a
-few nodes of each cell, spread over it.
+Owns `by_shapes` and `Shaped`. What `a_priori` does for one member, with orders that are proved, is done here for many
+at once, with orders that are proved for regions of parameters (`proved_shapes`), or that the Legendre coefficients at
+the nodes show to be enough. Nodes move with the ends of their cells (Reynolds' transport theorem), so that the
+tangents of the sums are the derivatives and no boundary term is left. Rounding is kept track of, as everywhere outside
+of integrals, at a few nodes of each cell, spread over it.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
+from msgspec import Struct
 
 from potto.integrate.fixed.cells.product_rule import CANCELS, FEW, ProductRule
 from potto.integrate.fixed.cells.proved_shapes import proved_rules
@@ -38,12 +39,20 @@ PROBE = 2
 ROUNDED = 1e-12
 
 
+class Shaped(Struct, frozen=True):
+    """Which members of a batch are done (B,), for which rounding alone leaves less than was asked for (B,), and the
+    sums of both, zero for all others."""
+
+    done: Bools
+    short: Bools
+    sums: Sums
+
+
 def by_shapes(
     plan: StraightIntegral, degrees: Sequence[int | None], machine: Evaluator, env: dict[str, Value], batch: int,
     tight: bool,
-) -> tuple[Bools, Sums] | None:  # fmt: skip
-    """Which members were integrated here, and the sums of all (zero for the others); None if none were: those for which
-    cuts have the same formulas together.
+) -> Shaped | None:  # fmt: skip
+    """What could be integrated here; None if nothing was: members for which cuts have the same formulas together.
 
     degrees: of what is integrated over each variable, where it is a polynomial. tight: whether all digits are wanted.
     """
@@ -51,7 +60,7 @@ def by_shapes(
         return None
     if plan.choices is None:
         return _of_one_form(plan, degrees, machine, env, batch, tight)
-    done, sums = np.zeros(batch, dtype=bool), Sums.zeros(1, machine.directions, batch)
+    (done, short), sums = np.zeros((2, batch), dtype=bool), Sums.zeros(1, machine.directions, batch)
     names = plan.choices.params
     met = np.array([np.broadcast_to(cell.v, batch) for cell in
                     evaluated(plan.choices, machine, {name: env[name] for name in names})])  # fmt: skip
@@ -61,15 +70,15 @@ def by_shapes(
         part = env if here.size == batch else gather(env, here)
         found = _of_one_form(own, degrees, machine, part, here.size, tight) if here.size else None
         if found is not None:
-            done[here] = found[0]
-            sums = sums.with_members(here, found[1])
-    return (done, sums) if done.any() else None
+            done[here], short[here] = found.done, found.short
+            sums = sums.with_members(here, found.sums)
+    return Shaped(done, short, sums) if done.any() or short.any() else None
 
 
 def _of_one_form(
     plan: StraightIntegral, degrees: Sequence[int | None], machine: Evaluator, env: dict[str, Value], batch: int,
     tight: bool,
-) -> tuple[Bools, Sums] | None:  # fmt: skip
+) -> Shaped | None:  # fmt: skip
     """The same where cuts of all have the same formulas."""
     here = {name: env[name] for name in plan.names}
     done = np.zeros(batch, dtype=bool)
@@ -86,41 +95,46 @@ def _of_one_form(
                 return None
     if not done.any():
         return None
-    done &= _fine(machine, env, total)
-    if not done.any():
+    known, enough = _fine(machine, env, total)
+    short = done & enough & ~known & (batch > 1)  # for one there are other ways
+    done &= known & enough
+    settled = done | short
+    if not settled.any():
         return None
     number, rounding, gross, truncated = total
     error = np.add(truncated, rounding, out=truncated)
     added = np.stack((gross[0], gross[1:].max(axis=0, initial=0.0)))
-    if not done.all():
-        left = np.flatnonzero(~done)
+    if not settled.all():
+        left = np.flatnonzero(~settled)
         for part in (number, error, added):
             part[:, left] = 0.0
-    return done, Sums(number[None, 0], error[None, 0], number[None, 1:], error[None, 1:], gross=added)
+    found = Sums(number[None, 0], error[None, 0], number[None, 1:], error[None, 1:], gross=added)
+    return Shaped(done, short, found)
 
 
-def _fine(machine: Evaluator, env: dict[str, Value], total: Array) -> Bools:
-    """Which members are as accurate as was asked for, by what was found for each: (4, 1 + k, B). Over large
-    batches it is memory that takes time: what does for most is asked first."""
+def _fine(machine: Evaluator, env: dict[str, Value], total: Array) -> tuple[Bools, Bools]:
+    """Which members are known as accurately as was asked for despite rounding, and for which the rule has nodes enough,
+    by what was found for each: (4, 1 + k, B). Over large batches it is memory that takes time: what does for most is
+    asked first."""
     number, rounding, gross, truncated = total
     whole = np.abs(number)
     whole[0] = np.abs(together(env, number[0]))
     asked = np.maximum(machine.atol, np.multiply(whole, machine.rtol, out=whole), out=whole)
     fine = 2.0 * (truncated + rounding) <= asked
+    known, enough = np.ones((2, number.shape[1]), dtype=bool)
     rest = np.flatnonzero(~fine.all(axis=0))
     if not rest.size:
-        return np.ones(number.shape[1], dtype=bool)
-    several = number.shape[1] > 1  # for one there are other ways
+        return known, enough
     added = together(env, gross.max(axis=0)).take(rest)
-    most = CANCELS * added if several else 0.0
-    left = np.maximum(most, min(machine.rtol, ROUNDED) * np.minimum(added, 1.0)) if several else 0.0
     asked, cut, off = (part.take(rest, 1) for part in (asked, truncated, rounding))
-    known = off <= np.maximum(asked - cut, left)
-    known[1:] |= added_up(env, number[1:], rounding[1:], 0.5 * machine.rtol).take(rest, 1)
-    known &= cut <= np.maximum(0.5 * asked, most)
-    found = np.ones(number.shape[1], dtype=bool)
-    found[rest] = known.all(axis=0)
-    return found
+    if number.shape[1] == 1:  # for one there are other ways
+        added[:] = 0.0
+    most, left = CANCELS * added, min(machine.rtol, ROUNDED) * np.minimum(added, 1.0)
+    accurate = off <= np.maximum(asked, left) - cut
+    accurate[1:] |= added_up(env, number[1:], rounding[1:], 0.5 * machine.rtol).take(rest, 1)
+    known[rest] = accurate.all(axis=0)
+    enough[rest] = (cut <= np.maximum(0.5 * asked, most)).all(axis=0)
+    return known, enough
 
 
 def _settled(

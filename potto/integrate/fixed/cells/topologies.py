@@ -24,7 +24,7 @@ from potto.integrate.fixed.straight import CLEAR, ROW_BITS, RowNumbers, Straight
 from potto.integrate.pieces import Evaluator, gather
 from potto.kernels.cells import Array, Bools, Cell, Ints, Number, Value
 
-LEAST = 64  # members, below which machine code takes longer to be called than numpy
+LEAST = 2  # members, below which numbers are no columns for machine code
 FEW = 16  # numbers, up to which comparing with each of them takes less time than looking them up
 Turning = tuple[tuple[bool, bool], ...]
 

@@ -24,7 +24,7 @@ from potto.runtime.answers.convergence import missing, rounded
 from potto.runtime.integration.methods.attempts import proved_beforehand
 from potto.runtime.integration.methods.choices import orders, preferred
 from potto.runtime.integration.methods.directions import by_directions
-from potto.runtime.integration.methods.quadrature import cut_up, iterated, whole_boxes
+from potto.runtime.integration.methods.quadrature import cut_up, whole_boxes
 from potto.runtime.integration.problem import Problem
 
 # Up to how many members are done one by one, to the digits that each has by itself.
@@ -127,7 +127,8 @@ def _together(problem: Problem, todo: Ints, settled: Settled, found: Whole) -> l
     for order in preferred(problem):
         with problem.among(todo) as here:
             others = (here.plan(other) for other in orders(problem.term) if other is not order)
-            sums = cut_up(here.plan(order), here.machine, here.env, here.batch, others)
+            few = _singly(problem)
+            sums, short = cut_up(here.plan(order), here.machine, here.env, here.batch, others, few)
         kinds = _kinds(here.events, todo.size)
         if kinds is None and todo.size > MOST_UNKNOWN:
             for half in np.array_split(todo, 2):
@@ -136,6 +137,8 @@ def _together(problem: Problem, todo: Ints, settled: Settled, found: Whole) -> l
         if kinds is None:
             return [*alone, todo]
         turned, trouble, *apart = kinds
+        if short.sum() <= few:
+            trouble |= short
         plain = ~np.logical_or.reduce(kinds)
         for group in (np.nonzero(kind)[0] for kind in (plain, *apart)):
             if group.size:
@@ -143,9 +146,9 @@ def _together(problem: Problem, todo: Ints, settled: Settled, found: Whole) -> l
                     part.events.take(here.events.of(group, TwoSided, Fold, Along), np.arange(group.size))
                     own = settled(part, order, sums.pick(group))
                     rough = missing(problem.term, own, problem.machine.settings, part.env)
+                    rough &= ~short[group]
                     spoilt = rough & rounded(own) if rough.any() else rough
                     if spoilt.sum() > FEW_MEMBERS:
-                        by_cuts(part, order, own, spoilt)
                         rough &= ~spoilt
                 if rough.sum() > MOST_ROUGH:
                     rough[:] = False
@@ -163,17 +166,6 @@ def _together(problem: Problem, todo: Ints, settled: Settled, found: Whole) -> l
         found.put(todo, by_directions(here))
     problem.events.take(here.events, todo)
     return alone
-
-
-def by_cuts(problem: Problem, order: Integral, sums: Sums, which: Bools) -> None:
-    """Put in the sums of cuts for some members where their errors are smaller: of rounding no other way mends more."""
-    index = np.nonzero(which)[0]
-    few = problem.picked(index).apart()
-    found = iterated(problem.plan(order), few.machine, few.env, index.size)
-    better = (found.e < sums.e[:, index]).all(axis=0) & (found.et <= sums.et[:, :, index]).all(axis=(0, 1))
-    better &= ~few.events.uncounted(index.size)
-    for name in ("v", "e", "t", "et"):
-        getattr(sums, name)[..., index[better]] = getattr(found, name)[..., better]
 
 
 def _kinds(events: Events, size: int) -> tuple[Bools, Bools, Bools, Bools] | None:

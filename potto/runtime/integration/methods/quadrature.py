@@ -10,14 +10,18 @@ from collections.abc import Iterable
 from contextlib import AbstractContextManager
 from functools import lru_cache
 from itertools import chain
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from potto.integrate.pieces import Sums, gather
 from potto.integrate.plan import Plan
 from potto.kernels.cells import Bools, Ints, Value
+from potto.runtime.answers.convergence import rounded
 from potto.runtime.evaluation.machine import Machine
+
+if TYPE_CHECKING:
+    from potto.integrate.fixed.cells.alike import Shaped
 
 START_ORDER = 11
 ORDERS = (4, 6, 10, 14, 18)
@@ -34,11 +38,11 @@ def in_parts(plan: Plan, machine: Machine, env: dict[str, Value], batch: int) ->
     """Quadrature: whole boxes first, then what is cut."""
     found = whole_boxes(plan, machine, env, batch)
     if found is None:
-        return cut_up(plan, machine, env, batch)
+        return cut_up(plan, machine, env, batch)[0]
     sums, rest = found
     if rest.size:
         apart = machine.apart()
-        sums = sums.with_members(rest, cut_up(plan, apart, gather(env, rest), rest.size))
+        sums = sums.with_members(rest, cut_up(plan, apart, gather(env, rest), rest.size)[0])
         machine.events.take(apart.events, rest)
     return sums
 
@@ -58,37 +62,62 @@ def whole_boxes(plan: Plan, machine: Machine, env: dict[str, Value], batch: int)
     return found
 
 
-def cut_up(plan: Plan, machine: Machine, env: dict[str, Value], batch: int, turned: Iterable[Plan] = ()) -> Sums:
-    """Quadrature along cuts: what a product rule settles first, then a bounded number of members at a time.
+def cut_up(
+    plan: Plan, machine: Machine, env: dict[str, Value], batch: int, turned: Iterable[Plan] = (), few: int = 0
+) -> tuple[Sums, Bools]:  # fmt: skip
+    """Quadrature along cuts: what a product rule settles first, then a bounded number of members at a time. With those
+    for which rounding leaves less than was asked for by every rule, and along cuts: of these the smallest errors.
 
     turned: plans with other variables innermost, by which a rule may settle members that it did not, since a surface is
-    steep in the one and flat in the other.
+    steep in the one and flat in the other. The first one is tried again where they are few: then rounding is followed
+    at every node. few: up to so many that rounding spoils by rules are not done along cuts, but left to the caller.
     """
     sums: Sums | None = None
-    rest = np.arange(batch)
-    for own in chain((plan,), turned):
-        if own is not plan and rest.size <= FEW_TURNED:
-            break
+    rest, short = np.arange(batch), np.zeros(batch, dtype=bool)
+    for number, own in enumerate(chain((plan,), turned, (plan,))):
+        if number and (rest.size <= FEW_TURNED or (own is plan and not rest.size <= FEW < batch)):
+            continue
         with one_thread():
-            found = _alike(own, machine, env if sums is None else gather(env, rest), rest.size, batch <= FEW)
-        if found is not None:
-            done, more = found
-            sums = more if sums is None else sums.with_members(rest[done], more.pick(done))
-            rest = rest[~done]
+            here = env if rest.size == batch else gather(env, rest)
+            found = _alike(own, machine, here, rest.size, batch <= FEW)
+        if found is None:
+            continue
+        spoilt = found.short & rounded(found.sums)
+        sums = found.sums if sums is None else _with(sums, rest, found.sums, found.done | spoilt, short)
+        short[rest] |= spoilt
+        short[rest[found.done]] = False
+        rest = rest[~found.done]
         if not rest.size:
-            break
+            return sums, short
     if sums is None:
-        return iterated(plan, machine, env, batch)
-    if rest.size:
-        apart = machine.apart()
-        sums = sums.with_members(rest, iterated(plan, apart, gather(env, rest), rest.size))
-        machine.events.take(apart.events, rest)
-    return sums
+        return iterated(plan, machine, env, batch), short
+    if short.sum() <= few:
+        rest = rest[~short[rest]]
+        if not rest.size:
+            return sums, short
+    apart = machine.apart()
+    last, known = iterated(plan, apart, gather(env, rest), rest.size), short[rest]
+    sums = _with(sums, rest, last, ~(known & apart.events.uncounted(rest.size)), short)
+    machine.events.take(apart.events.of(np.flatnonzero(~known)), rest[~known])
+    return sums, short
 
 
-def _alike(
-    plan: Plan, machine: Machine, env: dict[str, Value], batch: int, tight: bool
-) -> tuple[Bools, Sums] | None:  # fmt: skip
+def _with(sums: Sums, members: Ints, part: Sums, good: Bools, short: Bools) -> Sums:
+    """The sums with those of some members that are good; of those that have come short before, with the numbers that
+    have smaller errors."""
+    again = np.flatnonzero(good & short[members])
+    if again.size:
+        before, own = sums.pick(members[again]), part.pick(again)
+        for number, error in (("v", "e"), ("t", "et")):
+            keep = getattr(before, error) < getattr(own, error)
+            for name in (number, error):
+                setattr(own, name, np.where(keep, getattr(before, name), getattr(own, name)))
+        part.put(again, own)
+    index = np.flatnonzero(good)
+    return sums.with_members(members[index], part.pick(index))
+
+
+def _alike(plan: Plan, machine: Machine, env: dict[str, Value], batch: int, tight: bool) -> Shaped | None:
     """Members with cells that are alike, where all of their cuts are plain; tight: to all digits.
 
     One by itself is to have more digits there than product rules give over more than two variables.
