@@ -7,12 +7,13 @@ do not.
 
 from __future__ import annotations
 
-from potto.core.kinds import Term
-from potto.core.walking import bound_names, children, fresh, rebuild, rename_bound, transform, unknown
+from potto.core.kinds import Array, Fold, Integral, Lam, Sum, Term
+from potto.core.walking import Holding, bound_names, children, fresh, rebuild, rename_bound, transform, unknown
 
 # Of a term the names that binders in it bind, and whether one of them is bound by a binder around it too.
 Bound = dict[Term, tuple[frozenset[str], bool]]
 NOTHING: tuple[frozenset[str], bool] = frozenset(), False
+_holds_binder = Holding(Lam, Integral, Sum, Array, Fold)
 
 
 def apart(root: Term, known: Bound | None = None) -> Term:
@@ -20,6 +21,8 @@ def apart(root: Term, known: Bound | None = None) -> Term:
 
     known: what is known of terms already; it grows, and what is in it is not looked through again.
     """
+    if not _holds_binder(root):
+        return root
     known = {} if known is None else known
     for node in unknown(root, known):
         own, below = bound_names(node), [found for c in children(node) if (found := known[c]) is not NOTHING]

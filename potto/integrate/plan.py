@@ -79,9 +79,10 @@ class Plan(Struct, frozen=True, dict=True):
     over: LevelSet | None = None
 
     def packed(self) -> bytes:
-        """As bytes; those of the outline are made once. Raises TypeError where something in it is no data."""
-        _, *own = (getattr(self, name) for name in self.__struct_fields__)
-        return packed([self.outline.packed, *own])
+        """As bytes; those of the outline are made once. Of the integrand with calls carried out they tell whether there
+        is one: it is made in the time in which it is read. Raises TypeError where something in it is no data."""
+        own = {name: getattr(self, name) for name in self.__struct_fields__ if name not in ("outline", "inlined")}
+        return packed([self.outline.packed, self.inlined is not None, own])
 
     @property
     def term(self) -> Integral:
@@ -195,10 +196,11 @@ def _force(trace: Trace, path: tuple[int, ...], mask: Mask) -> None:
     trace[path[-1]] = mask
 
 
-def unpacked_plan(data: bytes) -> Plan:
-    """The plan that bytes were made of. Raises ValueError where they were not."""
-    outline, *own = unpacked(data)
-    return Plan(unpacked(outline), *own)
+def unpacked_plan(data: bytes, inline: Resolve) -> Plan:
+    """The plan that bytes were made of. `inline`: see `make`. Raises ValueError where they were not of a plan."""
+    whole, carried_out, own = unpacked(data)
+    outline: Outline = unpacked(whole)
+    return Plan(outline, inlined=inlined(outline.term, inline) if carried_out else None, **own)
 
 
 class _Asked:

@@ -34,6 +34,7 @@ _cache_lock = threading.Lock()
 
 @lru_cache(maxsize=16384)
 def references(term: Term) -> tuple[Global, ...]:
+    """The definitions that a term names."""
     return tuple(t for t in postorder(term) if isinstance(t, Global))
 
 

@@ -10,12 +10,15 @@ import numpy as np
 import pytest
 
 import potto
+from potto.calculus.algebra import degree
 from potto.calculus.inlining import expand
 from potto.calculus.surfaces.discontinuities import ends_of_domain
+from potto.core import binders, packing
 from potto.core.terms import Term, rebuild
 from potto.integrate import plan
 from potto.integrate.outline import Outline, outlined
 from potto.kernels import compile as kernels
+from potto.kernels.written import Written
 
 RENDERER = """
 def renderer(c, shader)
@@ -82,6 +85,30 @@ def test_what_holds_no_call_is_not_rebuilt_for_another_shader(monkeypatch: pytes
 
     monkeypatch.setattr(expand, "rebuild", counted)
     assert 0 < swapped_under(44, lambda: len(rebuilt)) <= 4  # the call and the product that it stands in, at each look
+
+
+@pytest.mark.parametrize(
+    "conditions, room, name, most",  # each a number of its own: plans are known in all of a process
+    [
+        (46, binders, "bound_names", 0),  # there are none in it
+        (47, degree, "_node", 6),  # of the shader's body and the product that it stands in
+        (48, packing._Writer, "fields", 0),  # the outline's bytes are those of the first
+    ],
+)
+def test_what_another_shader_leaves_as_it_was_is_not_looked_through(
+    conditions: int, room: Any, name: str, most: int, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    looked_at = []
+    known = getattr(room, name)
+
+    def counted(*given: Any) -> Any:
+        if not isinstance(given[-1], Written):  # kernels are the shader's own
+            looked_at.append(given)
+        return known(*given)
+
+    monkeypatch.setenv("POTTO_CACHE", str(tmp_path))
+    monkeypatch.setattr(room, name, counted)
+    assert swapped_under(conditions, lambda: len(looked_at)) <= most
 
 
 def test_a_separately_compiled_renderer_gives_the_same_as_one_written_out(tmp_path: Path) -> None:

@@ -7,8 +7,10 @@ node along the innermost variable says everything.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from functools import lru_cache
 
-from potto.core.terms import Branch, Const, If, Prim, Proj, Term, Tuple, Var, children, postorder
+from potto.core.terms import Branch, Const, If, Prim, Proj, Term, Tuple, Var, children, postorder, unknown
+from potto.core.walking import Kept
 
 _ARITHMETIC = frozenset(("add", "neg", "mul", "div"))
 MOST = 40  # more nodes than these ask for are no saving
@@ -17,11 +19,17 @@ MOST = 40  # more nodes than these ask for are no saving
 def degree(term: Term, variables: Iterable[str]) -> int | None:
     """The largest degree that a term has in some variables together on any side of its surfaces; None if it is no
     polynomial."""
-    found: dict[Term, int | None] = {}
     names = frozenset(variables)
-    for node in postorder(term, below=value_parts):
+    found = _known(names).table()
+    for node in unknown(term, found, value_parts):
         found[node] = 0 if names.isdisjoint(node.free) else _node(node, [found[part] for part in value_parts(node)])
     return found[term]
+
+
+@lru_cache(maxsize=64)
+def _known(names: frozenset[str]) -> Kept[int | None]:
+    """Degrees in these variables: where another shader stands between surfaces, most parts are what they were."""
+    return Kept()
 
 
 def plane(term: Term, variables: Iterable[str]) -> bool:

@@ -10,10 +10,11 @@ from typing import Any
 
 from potto.calculus.inlining.numbers import with_numbers
 from potto.calculus.surfaces.branch_cuts import opened
-from potto.core.terms import Data, Deriv, Global, Integral, Lam, Term, postorder, reached
+from potto.core.terms import Data, Deriv, Global, Integral, Lam, Term, postorder
 from potto.diagnostics import PottoError
 from potto.integrate.outline import Outlines
 from potto.kernels.cells import Pattern, Value
+from potto.kernels.compile import references
 from potto.kernels.making import counts
 from potto.kernels.written import Kernel
 from potto.projects.settings import Settings
@@ -96,9 +97,13 @@ class Linker:
         """The definitions that terms lead to, with the digests of what they are: what a plan depends on."""
         found = self.reaches.get(terms)
         if found is None:
-            every = {node for parts in reached(*terms, resolve=self.reach.resolve) for node in parts}
-            names = [(node.module, node.name) for node in every if isinstance(node, Global)]
-            found = self.reaches[terms] = tuple(sorted((*name, self.term(*name).digest) for name in names))
+            names, waiting = set[Global](), list(terms)
+            while waiting:  # what a definition refers to is known from before, as most of them are
+                new = [name for name in references(waiting.pop()) if name not in names]
+                names.update(new)
+                waiting += [known for name in new if (known := self.reach.resolve(name)) is not None]
+            each = ((name.module, name.name) for name in names)
+            found = self.reaches[terms] = tuple(sorted((*name, self.term(*name).digest) for name in each))
         return found
 
     def function(self, head: Term) -> Lam | Deriv | None:

@@ -92,11 +92,12 @@ _known: OrderedDict[Any, Known] = OrderedDict()
 _lock = threading.Lock()
 
 
-def _recalled(key: tuple[object, ...]) -> Known:
-    """What an earlier process has found out about an integral; the digests in the key are those of contents."""
+def _recalled(key: tuple[object, ...], inline: Callable[[Term], Lam | Deriv | None]) -> Known:
+    """What an earlier process has found out about an integral; the digests in the key are those of contents. inline:
+    gives the functions that it calls."""
     name = repr(key).encode()
     plans = recall("plans", name) or []
-    return Known(name, [unpacked_plan(plan) for plan in plans], plans)
+    return Known(name, [unpacked_plan(plan, inline) for plan in plans], plans)
 
 
 def clear() -> None:
@@ -293,7 +294,7 @@ class Problem:
         with _lock:
             found = _known.get(key)
             if found is None:
-                found = _known[key] = _recalled(key)
+                found = _known[key] = _recalled(key, self.plain_function)
             _known.move_to_end(key)
             if len(_known) > MOST_INTEGRALS:
                 _known.popitem(last=False)
