@@ -333,3 +333,25 @@ def test_a_jump_that_is_multiplied_away_leaves_one_derivative() -> None:
     found = potto.deriv(JUMPS.flat)((1.0, 1.0))
     assert found.converged and not found.notes
     assert found.tangent == pytest.approx(0, abs=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("program", "slope"),
+    [
+        ("t*integral [-1, 1] [x^2 < t] d(x)", 0.0),  # 2 t^1.5
+        ("(3 + t)*t + exp(t)*sin(t)*integral [-1, 1] cos(x)*[x^2 < t] d(x)", 3.0),
+        ("t + t*integral [-1, 1] [x^2 < t] d(x) + t*integral [-1, 1] [x^4 < t] d(x)", 1.0),  # 2 t^1.5 + 2 t^1.25 + t
+    ],
+)
+def test_beside_a_fold_derivatives_go_like_roots_of_the_step(program: str, slope: float) -> None:
+    """The nearest steps alone leave as much as the root of a step, 1e-4."""
+    found = potto.grad(potto.compile(f"def f(t) {program}").f, "t")(0.0)
+    assert abs(found.tangent - slope) <= found.tangent_error <= 1e-10
+    assert found.converged and not found.notes
+
+
+def test_beside_a_fold_of_many_roots_the_derivative_is_not_told_better_than_it_is_known() -> None:
+    """2 t^(7/6): nothing is smooth in the fourth root of a step."""
+    found = potto.grad(potto.compile("def f(t) t*integral [-1, 1] [x^6 < t] d(x)").f, "t")(0.0)
+    assert abs(found.tangent) <= found.tangent_error
+    assert not found.notes

@@ -24,6 +24,7 @@ LEAP = 1e-9  # the part of a value that is no jump of it
 # How many places a smooth derivative is extrapolated from, each half as far as the one before, and the fewest of them:
 # from twelve that are 1/4 to 1/8192 away what is analytic as far as 1 has 12 digits, with what rounding leaves there.
 FINE, FEWEST = 12, 3
+POWERS = 1.0, 1 / 2, 1 / 3, 1 / 4  # of the step, in which derivatives are smooth: beside folds of so many roots
 UNNOTICED = 1e-8  # the part of derivatives by which those close by may be wrong with no word, where rounding hides it
 
 # Values, how far off they may be, their derivatives in a direction, and how far off those may be.
@@ -104,8 +105,9 @@ def one_direction(value: Value, d: int) -> Value:
 def _smooth(
     found: Sequence[Parts], places: Array, here: tuple[Array, Array], limit: Array, missed: Array
 ) -> tuple[Array, Array]:
-    """The limit of derivatives at places that shrink, and how far off it may be, where these are smooth: by polynomials
-    through neighbours among them, of which the one counts that changes the least when either end is left out. The limit
+    """The limit of derivatives at places that shrink, and how far off it may be, where these are smooth in the step, or
+    in its root, as beside a fold: by polynomials through neighbours among them, of which the one counts that changes
+    the least when either end is left out. The limit
     known before stays where nothing better is found, or another limit, which something nearer by has. One that is no
     number may come of rounding, which grows towards the parameters: it gives way to one that hardly changes, unless
     what is at the parameters is another value."""
@@ -115,8 +117,8 @@ def _smooth(
     cancelled = [np.finfo(float).eps * np.abs(v) / h**2 for h, (v, *_) in zip(places, found, strict=True)]
     noise = np.array([et + np.where(known, 0.0, more) for more, (*_, et) in zip(cancelled, found, strict=True)])
 
-    def through(first: int, end: int) -> tuple[Array, Array]:
-        near = places[first:end]
+    def through(power: float, first: int, end: int) -> tuple[Array, Array]:
+        near = np.abs(places[first:end]) ** power
         weights = np.array([np.prod([h / (h - own) for h in near if h != own]) for own in near])
         return np.tensordot(weights, slopes[first:end], 1), np.tensordot(np.abs(weights), noise[first:end], 1)
 
@@ -124,15 +126,17 @@ def _smooth(
     size = np.fmax.reduce(np.abs(slopes))
     v, e, *_ = found[-1]
     leap, sure = np.abs(v - here[0]), e + here[1] + LEAP * (np.abs(here[0]) + np.abs(v))
-    for first, end in itertools.combinations(range(FINE + 1), 2):
+    for power, (first, end) in itertools.product(POWERS, itertools.combinations(range(FINE + 1), 2)):
         if end - first < FEWEST:
             continue
-        value, rounding = through(first, end)
-        change = np.fmax(*(np.abs(value - through(*fewer)[0]) for fewer in ((first + 1, end), (first, end - 1))))
+        value, rounding = through(power, first, end)
+        fewer = (through(power, *row)[0] for row in ((first + 1, end), (first, end - 1)))
+        change = np.fmax(*(np.abs(value - other) for other in fewer))
         apart = np.where(known, np.abs(value - limit), 0.0)
         less = change + rounding + np.where(apart <= missed + change + rounding, 0.0, apart)
-        near = apart <= missed + change + rounding + UNNOTICED * size
-        steady = (less <= SAME * size) & (leap <= 2 * np.abs(places[-1]) * (np.abs(value) + less) + sure)
+        small = less <= SAME * size  # in the root of a step what is not smooth hardly changes from place to place
+        near = (small | (power == 1)) & (apart <= missed + change + rounding + UNNOTICED * size)
+        steady = small & (leap <= 2 * np.abs(places[-1]) * (np.abs(value) + less) + sure)
         better = np.where(known, near, steady) & (less < off)
         best, off = np.where(better, value, best), np.where(better, less, off)
     return best, np.where(np.isfinite(best), off, missed)
