@@ -258,20 +258,22 @@ class Iteration(Struct):
         unsure: dict[int, Bools] = {}
         undefined: dict[int, Bools] = {}
         flat: dict[int, Bools] = {}
-        values = sides_at(level, scene.env, seg, scene.machine)
-        for group, (at_middle, off), turned in zip(level.decided, values, level.turned, strict=True):
+        at_middle, off = sides_at(level, scene.env, seg, scene.machine)
+        up: Bools = at_middle > 0
+        on_it: Bools = at_middle == 0
+        hidden, unknown = np.abs(at_middle) < off, np.isnan(at_middle)
+        told = ((undefined, unknown), (unsure, hidden), (flat, on_it & ~hidden))
+        met = [(found, of, np.any(of, axis=1).tolist()) for found, of in told if of.any()]
+        for number, (group, turned) in enumerate(zip(level.decided, level.turned, strict=True)):
             if any(outer not in sides for outer in turned) or (self.face is not None and group == self.face.group):
                 continue  # one that is not defined, or has both
-            side = at_middle >= 0 if self.plan.groups[group].up_at_zero else at_middle > 0
+            side = up[number] | on_it[number] if self.plan.groups[group].up_at_zero else up[number]
             for outer in turned:
                 side = side ^ np.logical_not(sides[outer])
             sides[group] = side
-            if np.isnan(at_middle).any():
-                undefined[group] = np.isnan(at_middle)
-            if (hidden := np.abs(at_middle) < off).any():
-                unsure[group] = hidden
-            if (zero := (at_middle == 0) & ~hidden).any():
-                flat[group] = zero
+            for found, of, there in met:
+                if there[number]:
+                    found[group] = of[number]
         if flat and scene.machine.directions and not (scene.machine.side or scene.machine.frozen):
             note_flat(scene, seg, flat)
         if not unsure:

