@@ -293,10 +293,11 @@ def _branch(node: Branch, texts: _Texts) -> _Text:
     if condition is not None:
         return _Text(f"[{condition.text}]", _ATOM, condition)
     if len(node.coordinates) > 1 and not node.strict:
-        test = f"diffeo({_list(node.coordinates, texts)})"
-    else:
-        test = f"[{_comparison(node, True, texts).text}]"
-    return _Text(f"if {test} then {then.text} else {orelse.text}", _OPEN)
+        return _Text(f"if diffeo({_list(node.coordinates, texts)}) then {then.text} else {orelse.text}", _OPEN)
+    test, inner = _comparison(node, True, texts), node.then
+    while isinstance(inner, Branch) and inner.orelse is node.orelse and len(inner.coordinates) == 1:
+        test, inner = _joined("and", test, _comparison(inner, True, texts)), inner.then
+    return _Text(f"if [{test.text}] then {texts[inner].text} else {orelse.text}", _OPEN)
 
 
 def _combined(node: Branch, then: _Text, orelse: _Text, texts: _Texts) -> _Text | None:

@@ -25,7 +25,7 @@ from potto.types.types import Function
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 WITHOUT = {
-    "room.po:mean", "hidden.po:pixel", "room.po:discomfort", "plate.po:stepped",  # too long to be read
+    "hidden.po:pixel", "room.po:discomfort", "plate.po:stepped",  # too long to be read
     "geometry.po:pixel", "main.po:two_tones", "main.po:by_law", "shadows.po:sharp", "sphere.po:pixel",
     "sphere.po:shaded", "stylize.po:pixel", "shadows.po:softly",
 }  # fmt: skip
@@ -71,6 +71,27 @@ def test_examples(path: str, name: str) -> None:
         given, derivative = _given(shown, module, rng)
         formula = module.eval(shown.formula(given))
         assert near(formula.value, derivative.value), (shown.text.tangent, shown.formula(given))
+
+
+BEYOND = [
+    ("integral [0, 3] [x^2 > a] d(x)", 0.49, -0.5 / 0.7),  # 3 - sqrt(a)
+    ("integral [0, 1] [x > a^2]*log(1 + a*x) d(x)", 1.5, 0.0),  # at -1.5 neither 1 + a^3 > 0 nor a^2 < 1
+    ("sum i in 1..3 (integral [0, 1] [x^i < a] d(x))", 0.64, 1 + 0.5 / 0.8 + 0.64 ** (-2 / 3) / 3),
+    ("integral [-1, 1] [x^3 < 1]*[x^2 < a] d(x)", 0.64, 1 / 0.8),  # 2*sqrt(a)
+]
+
+
+@pytest.mark.parametrize(("body", "above", "slope"), BEYOND)
+def test_a_formula_is_0_where_a_factor_without_a_value_counts_for_nothing(
+    body: str, above: float, slope: float
+) -> None:
+    """At the negative of a place where the slope is known by hand (to 1e-12, in doubles) nothing moves in the domain,
+    and the roots and logarithms of the formula have no value."""
+    shown = Shown(f"def f(a) {body}\n", "f")
+    assert shown.problems() == []
+    module = shown.module()
+    assert module.eval(f"shown_1({above}, 1)").value == pytest.approx(slope, rel=1e-12, abs=1e-12)
+    assert module.eval(f"shown_1({-above}, 1)").value == 0
 
 
 def test_equations_that_lead_back_to_each_other_are_given_up(monkeypatch: pytest.MonkeyPatch) -> None:

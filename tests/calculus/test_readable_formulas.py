@@ -214,7 +214,7 @@ def test_the_state_of_a_fold_has_the_fields_of_the_first_one() -> None:
 @pytest.mark.parametrize(
     ("program", "read"),
     [
-        ("sum i in 1..5 (integral [0, 1] [x*abs(i) < t/i] d(x))", "sum i in 1..5 (dt/i^2*[t > 0 and t < i^2])"),
+        ("sum i in 1..5 (integral [0, 1] [x*abs(i) < t/i] d(x))", "sum i in 1..5 (dt/i^2*[t < i^2 and t > 0])"),
         ("sum i in -5..-1 (integral [0, 1] [x*i < t] d(x))", "sum i in -5..-1 (-dt/i*[t < 0 and i < t])"),
         ("sum i in -1..5 (integral [0, 1] [x*i < t] d(x))", "sum i in -1..5 (dt/abs(i)*[t*i > 0 and t/i < 1])"),
         ("sum i in 1..5 (sum j in i..9 (integral [0, 1] [j*x < t] d(x)))",
@@ -226,3 +226,19 @@ def test_an_index_has_the_sign_of_its_range(program: str, read: str) -> None:
     library = Library()
     facts = derivative_facts(library.db, library.put("<text>", f"def f(t) {program}"), "f")
     assert facts is not None and facts.derivative == read
+
+
+@pytest.mark.parametrize(
+    ("program", "read"),
+    [
+        ("integral [0, 1] (if [x < a] then (if [a < b] then 1 else x) else (if [a < b] then 3 else x)) d(x)",
+         "-2*da*[a > 0 and a < 1 and a < b]"),
+        ("integral ([0, 1], [0, 1]) (if [x < a and y < b] then x*y else x + y)*[x > 2] d(x, y)", "0"),
+        ("integral [0, 4] [x^2 > a] d(x)", "if [a > 0 and a < 16] then -da/(2*sqrt(a)) else 0"),
+    ],
+)  # fmt: skip
+def test_what_differs_between_two_choices_is_one(program: str, read: str) -> None:
+    library = Library()
+    facts = derivative_facts(library.db, library.put("<text>", f"def f(a, b) {program}"), "f")
+    assert facts is not None
+    assert explain_derivative(library.db, library.put("<text>", f"def f(a, b) {program}"), "f").tangent == read

@@ -1,40 +1,59 @@
 """A choice between two formulas, told in one.
 
-Owns `in_one`: the side that a known condition takes, what both sides share in front of the choice, and a function of
-abs(u) where the sign of u chooses between one of u and the same of -u.
+Owns `in_one`, `sums_of_choices` and `holds`: the side that a known condition takes, what both sides share in front of
+the choice, a function of abs(u) where the sign of u chooses between one of u and the same of -u, and what a sum comes
+to on either side of a condition that chooses in it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from fractions import Fraction
 
+from potto.calculus.algebra.ranges import Box, range_of
 from potto.calculus.algebra.rational_form import normal
 from potto.calculus.explanation.brackets import constant
 from potto.calculus.explanation.factors import Factors, factored, written
 from potto.core.polynomials import size_of
-from potto.core.terms import ZERO, Branch, If, Prim, Term, add, children, mul, neg, prim, rebuild, sub, transform
+from potto.core.terms import (
+    ZERO,
+    Branch,
+    If,
+    Prim,
+    Term,
+    add,
+    children,
+    mul,
+    neg,
+    postorder,
+    prim,
+    rebuild,
+    sub,
+    transform,
+)
 
 Cost = Callable[[Term], float]
 
 
 def in_one(node: If | Branch, tangents: frozenset[str], inside: frozenset[str], cost: Cost) -> Term:
     """The shortest way to write a choice. inside: variables on which no sign may depend."""
-    known = _holds(node.condition) if isinstance(node, If) else None
+    known = holds(node.condition) if isinstance(node, If) else None
     if known is not None:
         return node.then if known else node.orelse
     whole = _of_size(node, tangents, inside) if isinstance(node, Branch) and len(node.coordinates) == 1 else None
     return min((node, _apart(node, tangents)) if whole is None else (node, whole), key=cost)
 
 
-def _holds(condition: Term) -> bool | None:
-    """Whether a comparison of numbers holds; None where it is one of something else: u == u asks whether u has
-    a value."""
+def holds(condition: Term, box: Box | None = None) -> bool | None:
+    """Whether a comparison of numbers holds, or that two things are equal whose difference is never 0; None where it is
+    one of something else: u == u asks whether u has a value. box: the ranges of variables."""
     match condition:
         case Prim(op="eq" | "lt" | "le" as op, args=(a, b)):
             value = None if condition.free else constant(sub(a, b))
             if value is not None:
                 return value == 0 if op == "eq" else value < 0 or (op == "le" and value == 0)
+            if op == "eq" and a is not b and not range_of(sub(a, b), box).zero:
+                return False
     return None
 
 
@@ -59,6 +78,40 @@ def _apart(node: If | Branch, tangents: frozenset[str]) -> Term:
     choice = sides[0] if sides[0] == sides[1] else _choosing(node, *sides)
     shared.times(choice, 1)
     return written(shared, tangents)
+
+
+def sums_of_choices(node: Prim, tangents: frozenset[str]) -> Iterator[tuple[If | Branch, Term, Term, Term]]:
+    """A choice in a sum, with what summands come to on either side of it, and the others: first of those summands that
+    choose by the same condition, then of all."""
+    parts = [(arg, *_chosen(arg, tangents)) for arg in node.args]
+    first = next((choice for _, choice, _ in parts if choice is not None), None)
+    if first is None:
+        return
+    alike = [part for part in parts if part[1] is not None and _asked(part[1]) == _asked(first)]
+    others = [part[0] for part in parts if part not in alike]
+    then, orelse = (
+        add(*(mul(rest, choice.then if taken else choice.orelse) for _, choice, rest in alike if choice is not None))
+        for taken in (True, False)
+    )
+    if len(alike) > 1:
+        yield first, then, orelse, add(*others)
+    if others and all(not isinstance(part, If | Branch) for arg in others for part in postorder(arg)):
+        yield first, add(then, *others), add(orelse, *others), ZERO
+
+
+def _chosen(term: Term, tangents: frozenset[str]) -> tuple[If | Branch | None, Term]:
+    """The choice that is a factor of a term and what it is multiplied by; what is 0 on one side is none."""
+    found = factored(term)
+    for base, n in found.powers.items():
+        if isinstance(base, If | Branch) and n == 1 and ZERO not in (base.then, base.orelse):
+            rest = Factors(found.coefficient, dict(found.powers), found.exponents, found.conditions)
+            rest.times(base, -1)
+            return base, written(rest, tangents)
+    return None, term
+
+
+def _asked(choice: If | Branch) -> object:
+    return choice.condition if isinstance(choice, If) else (choice.coordinates, choice.strict)
 
 
 def _without(found: Factors, shared: Factors) -> Factors:

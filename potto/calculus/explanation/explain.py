@@ -245,15 +245,15 @@ def _integral(
     deltas, meeting, boundary, bounds = list[str](), list[str](), list[str](), list[str]()
     interior, reason = "", ""
     try:
-        interior = words.text(rate(node.body), *names, box=box)
+        interior = words.under_integral(rate(node.body), *names, box=box)
         for item in jumps(opened(node.body), node.variables, rate):
             if _outside(item.surface, box):
                 continue
             if continuous(item, node.variables):
                 meeting.append(equation(words.fields(item.surface)))
             else:
-                deltas.append(words.text(item.contribution, *names, box=box))
-        deltas += [words.text(t, *names, box=box) for t in moving_deltas(node, rate)]
+                deltas.append(words.under_integral(item.contribution, *names, box=box))
+        deltas += [words.under_integral(t, *names, box=box) for t in moving_deltas(node, rate)]
         plain = _without_deltas(node)
         reason = "" if plain is None else _why_searched(plain)
         if plain is not None and level_set(plain) is None:

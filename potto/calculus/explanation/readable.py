@@ -7,7 +7,7 @@ tangents, in which it is linear, and a product in the order of a textbook: numbe
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from fractions import Fraction
 from math import gcd, inf, isfinite, lcm
 
@@ -15,7 +15,7 @@ from msgspec import Struct
 
 from potto.calculus.algebra.ranges import Box, ValueRange, range_of
 from potto.calculus.algebra.rational_form import Rational, normal
-from potto.calculus.explanation.alternatives import in_one
+from potto.calculus.explanation.alternatives import holds, in_one, sums_of_choices
 from potto.calculus.explanation.brackets import Inequality, between, conditions, fewer, opposite, plainer
 from potto.calculus.explanation.brackets import bracket as bracket_of
 from potto.calculus.explanation.decimals import root_of_number
@@ -113,9 +113,13 @@ def _inside(node: _Binder, box: Box, work: _Work) -> Term:
 def _undecided(node: Term, known: Mapping[Term, Term], box: Box, work: _Work) -> Term:
     parts = children(node)
     new = rebuild(node, tuple(known[part] for part in parts)) if parts else node
-    if isinstance(new, Prim) and new.op == "abs" and new.free & box.keys():
+    if isinstance(new, Prim) and new.op == "abs":
         bounds = range_of(new.args[0], box)
         new = new.args[0] if bounds.lo >= 0 else neg(new.args[0]) if bounds.hi <= 0 else new
+    if isinstance(new, If) and (known_side := holds(new.condition, box)) is not None:
+        return new.then if known_side else new.orelse
+    if isinstance(new, Branch) and new.then is new.orelse:
+        return new.then
     if isinstance(new, Branch):
         taken = _taken(new, range_of(new.surface, box))
         if taken is not None:
@@ -193,9 +197,13 @@ class _Work:
 
     def _shortest(self, node: Prim) -> Term:
         """The shortest of: the product of its factors, and the node expanded, with the sums in it or around them."""
-        forms = [node, *self._signs(node)] if node.op == "add" else [written(factored(node), self.tangents)]
-        if node.op == "sqrt":
-            forms += self._of_squares(node)
+        match node.op:
+            case "add":
+                forms = [node, *self._signs(node), *self._choices(node)]
+            case "sqrt":
+                forms = [written(factored(node), self.tangents), *self._of_squares(node)]
+            case _:
+                forms = [written(factored(node), self.tangents)]
         if sum(1 for _ in postorder(node)) <= _MANY:
             whole, sums = self._with_sums_named(node)
             for form, named in ((node, []), (whole, sums)) if sums else ((node, sums),):
@@ -204,6 +212,21 @@ class _Work:
                     forms += [self._put_back(each, named) for each in self._expanded(found)]
         forms = list(dict.fromkeys(forms))
         return forms[0] if len(forms) == 1 else min(forms, key=self._cost)
+
+    def _choices(self, node: Prim) -> Iterator[Term]:
+        """Sums by the sides of a choice in them, which leave a product where one side comes to 0."""
+        for choice, *sides, others in sums_of_choices(node, self.tangents):
+            then, orelse = map(self.node, sides)
+            if isinstance(choice, If):
+                whole = if_(choice.condition, then, orelse)
+            elif orelse is ZERO:
+                whole = self.node(mul(then, branch(choice.coordinates, choice.strict, ONE, ZERO)))
+            elif then is ZERO and len(choice.coordinates) == 1:
+                other = self.node(neg(choice.surface))
+                whole = self.node(mul(orelse, branch((other,), not choice.strict, ONE, ZERO)))
+            else:
+                whole = branch(choice.coordinates, choice.strict, then, orelse)
+            yield add(whole, others)
 
     def _of_squares(self, node: Prim) -> list[Term]:
         """sqrt(r^2 - (x - a)^2) for sqrt((r - a + x)*(r + a - x))."""

@@ -13,6 +13,7 @@ from msgspec import Struct
 from potto.calculus.algebra.radicals import NAN
 from potto.calculus.algebra.ranges import Box
 from potto.calculus.explanation.decimals import in_decimals
+from potto.calculus.explanation.guarded import guarded
 from potto.calculus.explanation.readable import ReadableParts, readable
 from potto.calculus.surfaces.trace import spine
 from potto.core.printer import LEFT_OUT, format_term
@@ -78,14 +79,25 @@ class Words(Struct, frozen=True):
                 return self.plain(term)
 
     def text(self, term: Term, *inside: str, box: Box | None = None) -> str:
-        """A formula that is Potto, in the parameters, their tangents and the variables it is `inside` of. Raises
+        """A formula that is Potto, in the parameters, their tangents and the indices it is `inside` of. Raises
         NoFormula."""
+        return self._written(guarded(self._readable(term, inside, box), box))
+
+    def under_integral(self, term: Term, *inside: str, box: Box) -> str:
+        """The same of what stands under an integral, `inside` of its variables too: its brackets guard it there."""
+        return self._written(self._readable(term, inside, box))
+
+    def _readable(self, term: Term, inside: tuple[str, ...], box: Box | None) -> Term:
         plain = symbols(without_guards(simplify(transform(term, _by_formula))), self.functions)
         known = self.names | {"snd", *inside}
         strangers = {name for name in plain.free - known if name.rstrip("'") != "delta"}  # `delta'`: its derivative
         if strangers:
             raise NoFormula(f"where it jumps depends on `{min(strangers)}`, over which it is summed")
-        text = format_term(readable(simplify(self.fields(plain)), self.tangents, box, self.progress))
+        return readable(simplify(self.fields(plain)), self.tangents, box, self.progress)
+
+    @staticmethod
+    def _written(term: Term) -> str:
+        text = format_term(term)
         if LEFT_OUT in text:
             raise NoFormula("the formula is too long to be shown")
         return text

@@ -134,11 +134,13 @@ def _symbolic_power(base: Term, exponent: Term, value: Term) -> Steps:
     inverse = div(ONE, exponent)
     up = prim("pow", value, inverse)
     down, odd = neg(up), neg(prim("pow", neg(value), inverse))
-    # (-u)^p is nan unless p is an integer, and has the sign of y for an even p only (for an odd p when y < 0).
+    # (-u)^p is nan unless p is an integer, and has the sign of y for an even p where y > 0, for an odd p where y < 0.
+    down = guarded(mul(prim("pow", down, exponent), value), down, strict=True)
+    odd = guarded(mul(prim("pow", odd, exponent), value), odd, strict=True)
     return (
         IsolationStep(base, guarded(value, up)),
-        IsolationStep(base, guarded(mul(prim("pow", down, exponent), value), down, strict=True)),
-        IsolationStep(base, guarded(mul(prim("pow", odd, exponent), value), odd, strict=True)),
+        IsolationStep(base, guarded(value, down, strict=True)),
+        IsolationStep(base, guarded(neg(value), odd, strict=True)),
     )
 
 
