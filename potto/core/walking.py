@@ -102,9 +102,7 @@ def rebuild(term: Term, parts: tuple[Term, ...]) -> Term:
         raise ValueError(f"{len(parts)} parts for {len(old)} children")
     if all(map(is_, parts, old)):
         return term
-    match term:
-        case Const() | Var() | Global() | Hole() | Data():
-            return term
+    match term:  # what has no children is the term itself
         case Prim():
             return apply(term.op, *parts)
         case If():
@@ -142,6 +140,8 @@ def rebuild(term: Term, parts: tuple[Term, ...]) -> Term:
             return length(parts[0], term.rising, parts[1] if len(parts) > 1 else None, term.filled)
         case Deriv():
             return deriv(parts[0])
+        case Const() | Var() | Global() | Hole() | Data():
+            return term
 
 
 def postorder(*roots: Term, below: Callable[[Term], Sequence[Term]] | None = None) -> list[Term]:
@@ -221,7 +221,7 @@ class Holding:
     def __call__(self, term: Term) -> bool:
         known = self.known.table()
         for node in unknown(term, known):
-            known[node] = isinstance(node, self.kinds) or any(known[c] for c in children(node))
+            known[node] = type(node) in self.kinds or any(map(known.__getitem__, children(node)))
         return known[term]
 
 

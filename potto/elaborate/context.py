@@ -7,7 +7,7 @@ Owns `Elaboration` and `RULES`, the table of what each kind of expression elabor
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 from potto.core.terms import INF, PI, Lam, Term, Tuple, app, fresh, global_, hole, lam, proj, var
 from potto.elaborate import builtins
@@ -135,16 +135,12 @@ class Elaboration:
 
     def as_term(self, value: Value) -> Term:
         """The core term of a value: functions become lambdas."""
-        match value:
-            case LocalFunction():
-                found = self.made.get(value)
-                if found is None:
-                    found = self.made[value] = self.function(value)
-                return found
-            case BuiltinValue(name=name):
-                return self.builtin_lambda(name)
-            case _:
-                return value
+        if type(value) is LocalFunction:
+            found = self.made.get(value)
+            if found is None:
+                found = self.made[value] = self.function(value)
+            return found
+        return self.builtin_lambda(value.name) if type(value) is BuiltinValue else cast(Term, value)
 
     def function(self, closure: LocalFunction, types: Sequence[Sequence[Type]] = ()) -> Term:
         """A function as a term; `types` of its parameters, where they are known."""

@@ -51,7 +51,7 @@ from potto.types.types import (
 from potto.types.types import TypeVariable as TypeVar
 from potto.types.unify import as_tuple, open_type, parts, unify
 
-PLAIN = (Prim, Const)
+PLAIN = frozenset({Prim, Const})
 
 
 class Shapes:
@@ -68,7 +68,7 @@ class Shapes:
 
     def of(self, term: Term) -> Type:
         """The type of a term; of what is no composite, a number."""
-        if isinstance(term, PLAIN):  # as most are
+        if type(term) in PLAIN:  # as most are
             return REAL
         found = self.known.get(term)
         if found is None:

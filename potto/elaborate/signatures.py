@@ -18,6 +18,8 @@ from potto.syntax import nodes
 from potto.types import interface
 from potto.types.types import Diffeo, TupleOf, Type, dual_name, groups_of, resolve, result_of
 
+_FUNCTIONS = frozenset({Lam, Global, App, Deriv})  # terms that can be functions
+
 
 class CoreSignature(Struct, frozen=True):
     """The parameters of a definition, group by group; `dims` is the size of its result if that is a tuple. `record`: it
@@ -72,6 +74,8 @@ def _written(item: nodes.Definition | nodes.DiffeoDefinition) -> Groups:
 def groups_of_term(db: Database, term: Term, named: bool = True) -> Groups:
     """The parameters that a term takes, as far as they are known; empty for anything else. named: with the names that
     they have in definitions."""
+    if type(term) not in _FUNCTIONS:  # as most
+        return ()
     match term:
         case Lam(params=params, body=body):
             return (tuple(Slot(stem(name)) for name in params), *groups_of_term(db, body, named))

@@ -56,7 +56,7 @@ def free_references(root: Node | Statement) -> Iterator[nodes.Name | nodes.Membe
 def references_in(root: Node | Statement) -> tuple[Reference, ...]:
     """The free references in `root` as `(None, name)` and `(path, name)`, in the order of the text, each once."""
     found = free_references(root)
-    return tuple(dict.fromkeys((r.path, r.name) if isinstance(r, nodes.Member) else (None, r.id) for r in found))
+    return tuple(dict.fromkeys([(None, r.id) if isinstance(r, nodes.Name) else (r.path, r.name) for r in found]))
 
 
 def free_names(root: Item | Expr | nodes.Binding) -> frozenset[str]:

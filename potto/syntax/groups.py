@@ -107,9 +107,10 @@ def is_condition(expr: Expr) -> bool:
 
 def as_expr(context: Context, value: Any) -> Expr:
     """Parentheses that stand for a value: `(e)` or a tuple; anything but parentheses as it is."""
-    if isinstance(value, Suffixed):
+    kind = type(value)
+    if kind is Suffixed:
         return suffixed(as_expr(context, value.group), value.suffixes)
-    if not isinstance(value, Parenthesized):
+    if kind is not Parenthesized:
         return value  # type: ignore[no-any-return]
     items = list[Expr]()
     for written in value.written:

@@ -54,8 +54,10 @@ def call(function: Value, arguments: Sequence[Value], notes: Sequence[Step | Non
         case AbstractFunction(inputs, result, effects):
             binding = Substitution(effects=effects)
             given = _regroup(len(inputs), arguments)
-            places = sorted(range(min(len(inputs), len(given))), key=lambda place: isinstance(inputs[place], Abstract))
-            for place in places:  # functions last: where they jump hangs on what they are given
+            places: Sequence[int] = range(min(len(inputs), len(given)))
+            if Abstract in map(type, inputs):  # functions last: where they jump hangs on what they are given
+                places = sorted(places, key=lambda place: isinstance(inputs[place], Abstract))
+            for place in places:
                 bind(inputs[place], given[place], binding, notes[place] if place < len(notes) else None)
             return substitute(result, binding), played(effects, binding)
         case Abstract():

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from typing import Any
 
 from msgspec.structs import replace as changed
 
@@ -51,13 +52,15 @@ def only_called(root: Node) -> frozenset[Reference]:
     """What a definition does nothing with but call it, all arguments by their places."""
     called: set[int] = set()
     used: dict[int, Reference] = {}
-    for node in under(root):
-        if isinstance(node, nodes.Name):
-            used[id(node)] = None, node.id
-        elif isinstance(node, nodes.Member):
-            used[id(node)] = node.path, node.name
-        elif isinstance(node, nodes.Apply) and all(argument.name is None for argument in node.arguments):
-            called.add(id(node.function))
+    each: Any  # `kind` tells what it is, faster than a type checker can follow
+    for each in under(root):
+        kind = type(each)
+        if kind is nodes.Name:
+            used[id(each)] = None, each.id
+        elif kind is nodes.Member:
+            used[id(each)] = each.path, each.name
+        elif kind is nodes.Apply and all(argument.name is None for argument in each.arguments):
+            called.add(id(each.function))
     others = {reference for place, reference in used.items() if place not in called}
     return frozenset(used.values()) - others
 

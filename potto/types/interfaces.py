@@ -183,14 +183,14 @@ class Closing:
         if isinstance(value, AbstractScalar):
             return self._scalar(value)
         match value:
-            case TupleValue(items):
-                return TupleValue(tuple(map(self.value, items)))
-            case ListValue(item):
-                return ListValue(self.value(item))
             case AbstractFunction(inputs, result, effects):
                 for source in inputs_of(inputs):  # a function inside a choice or a list has numbers of its own
                     self.sources.setdefault(source, _source(len(self.sources)))
                 return AbstractFunction(tuple(map(self.value, inputs)), self.value(result), self._effects(effects))
+            case TupleValue(items):
+                return TupleValue(tuple(map(self.value, items)))
+            case ListValue(item):
+                return ListValue(self.value(item))
             case Abstract(ports, result, taint):
                 trees = tuple(map(self._tree, ports))
                 trees = self._trees.setdefault(id(ports), trees)  # the identity of ports is that of the function

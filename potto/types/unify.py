@@ -35,6 +35,7 @@ from potto.types.types import (
 
 NUMBERS = (Real, Dist)
 SIZES = (Count, SizeVar, Shifted, AnySize)
+_TUPLES = (TupleOf, Diffeo)
 MAX_LEAVES = 4096  # numbers in one tuple: beyond it a program is wrong (or hostile)
 
 
@@ -43,17 +44,19 @@ def unify(a: Type, b: Type) -> bool:
     if a is b:  # as numbers mostly are
         return True
     a, b = _reduced(a), _reduced(b)
-    if a is b or isinstance(a, Unknown) or isinstance(b, Unknown):
+    if (
+        a is b or type(a) is Unknown or type(b) is Unknown
+    ):  # of a class that a value is not of, `isinstance` takes longer
         return True
     if isinstance(a, Meta):
         return _bind(a, b)
     if isinstance(b, Meta):
         return _bind(b, a)
-    if isinstance(a, NUMBERS):
-        return isinstance(b, NUMBERS)
+    if type(a) in NUMBERS:
+        return type(b) in NUMBERS
     if isinstance(a, Function):
         return isinstance(b, Function) and _unify_functions(a, b)
-    if isinstance(a, TupleOf | Diffeo) and isinstance(b, TupleOf | Diffeo):
+    if isinstance(a, _TUPLES) and isinstance(b, _TUPLES):
         return _unify_tuples(a, b)
     if isinstance(a, ArrayOf) and isinstance(b, ArrayOf):
         fits = unify(a.item, b.item)
@@ -67,8 +70,8 @@ def unify(a: Type, b: Type) -> bool:
 
 def _reduced(type: Type) -> Type:
     """What is known about a type. What a size is shifted from may be shifted itself: `n + 1 - 1` is `n`."""
-    type = resolve(type)
-    return shifted(type, 0) if isinstance(type, Shifted) else type
+    found = resolve(type)
+    return shifted(found, 0) if found.__class__ is Shifted else found
 
 
 def _unify_sizes(a: Type, b: Type) -> bool:

@@ -196,6 +196,7 @@ class _Place(Struct, frozen=True):
 
 
 _BODIES = (Lam, Sum, Array, Fold)
+_LOOKED_AT = frozenset({*_BODIES, Integral, App, Branch, Delta})
 
 
 class _Walk:
@@ -212,16 +213,17 @@ class _Walk:
     def term(self, term: Term, place: _Place) -> None:
         nodes = postorder(term)
         self.taken |= term.free
-        for node in nodes:
-            if isinstance(node, _BODIES):
-                self.taken |= node.body.free
-            elif isinstance(node, Integral):
+        looked_at = [node for node in nodes if type(node) in _LOOKED_AT]
+        for node in looked_at:
+            if isinstance(node, Integral):
                 self.taken.update(node.variables)
                 for name, (lo, hi) in zip(node.variables, node.bounds, strict=True):
                     self.box[name] = (_number(lo, -math.inf), _number(hi, math.inf))
-        heads = {node.function for node in nodes if isinstance(node, App)}
-        for node in nodes:
-            if isinstance(node, Branch | Delta):
+            elif isinstance(node, _BODIES):
+                self.taken |= node.body.free
+        heads = {node.function for node in looked_at if isinstance(node, App)}
+        for node in looked_at:
+            if isinstance(node, (Branch, Delta)):
                 self.met.append((node, place))
             elif isinstance(node, App) and node not in heads:
                 self.call(node, place)
