@@ -92,6 +92,8 @@ def without_consequences(found: list[Diagnostic]) -> list[Diagnostic]:
     """Where one closing bracket closes nothing, its partner may be missing: what was said of the text before it is
     about what that leaves behind. Bounds are counted where nothing else is wrong with them or with the integrand. What
     stands in the head of a function without `def` is read as an expression."""
+    if not found:
+        return found
     heads = [d.span for d in found if d.code == kinds.DEFINITION_HEAD.code]
     in_heads = {d.span.start for d in found for head in heads if head.start <= d.span.start < head.end}
     found = [d for d in found if d.code != kinds.NOT_A_NAME.code or d.span.start not in in_heads]

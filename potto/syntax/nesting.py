@@ -149,6 +149,9 @@ class Nesting:
 
     def close_bracket(self, kind: str, word: str, start: int, end: int) -> None:
         """A closing bracket: adds its token, mended if it is the wrong one, or none if nothing is open."""
+        if self.brackets and _CLOSER[self.brackets[-1].kind] == kind:
+            self._close(kind, word, start, end)
+            return
         if not self.brackets or self._is_stray(kind, end):
             opening = _CHARACTER["LPAR" if kind == "RPAR" else "LSQB"]
             self.report(
@@ -173,10 +176,14 @@ class Nesting:
                     suggestions=write(self.text, Span(start, end), _CHARACTER[wanted]),
                 )
             )
+        self._close(wanted, word, start, end)
+
+    def _close(self, kind: str, word: str, start: int, end: int) -> None:
+        """Close the innermost bracket."""
         self.end_words()
         self.ranges.discard(len(self.brackets))
         self.brackets.pop()
-        self.tokens.append(Token(wanted, word, start, end))
+        self.tokens.append(Token(kind, word, start, end))
 
     def _is_stray(self, kind: str, end: int) -> bool:
         """Whether a closing bracket is of a kind that is not open, and what is open is closed further on without it."""

@@ -219,7 +219,7 @@ class Inference:
 
     def recursive(self) -> bool:
         """Whether the definition refers to one of its own group."""
-        return any(isinstance(meaning, RecursiveName) for meaning in self.meanings.values())
+        return RecursiveName in map(type, self.meanings.values())
 
     def loop(self) -> Reaching:
         """What indices reach in a loop is forgotten behind it."""

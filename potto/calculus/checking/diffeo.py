@@ -213,11 +213,13 @@ def _products(
     db: Database, term: Term, found: Sequence[Condition], spans: Mapping[Term, Span], fallback: Span
 ) -> Iterable[Diagnostic]:
     """Deltas that meet on one surface: what they are multiplied by is looked at only where there are any."""
-    for node in postorder(term):
+    deltas, nodes = [c.anchor for c in found if c.delta], postorder(term)
+    if not deltas and Deriv not in map(type, nodes):
+        return
+    for node in nodes:
         if not isinstance(node, Integral):
             continue
         parts = postorder(node.body)
-        deltas = [c.anchor for c in found if c.delta]
         anchors = [anchor for anchor in deltas if anchor in parts]
         anchors += [p for p in parts if isinstance(p, App) and isinstance(spine(p)[0], Deriv)]
         if not anchors:

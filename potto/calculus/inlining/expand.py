@@ -108,6 +108,8 @@ class Expansion:
         return apart(self.run(term, ()), self.bound)
 
     def run(self, term: Term, path: tuple[Term, ...]) -> Term:
+        if not holds_call(term):
+            return term
         memo: dict[Term, Term] = {}
         for node in postorder(term, below=_below_calls):
             if not holds_call(node):
