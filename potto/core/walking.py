@@ -287,19 +287,20 @@ def substitute(term: Term, mapping: Mapping[str, Term]) -> Term:
     mapping = {name: new for name, new in mapping.items() if name in term.free}
     if not mapping:
         return term
-    names, incoming = frozenset(mapping), union_of(mapping.values())
+    untouched, incoming = frozenset(mapping).isdisjoint, union_of(mapping.values())
 
     def below(node: Term) -> Sequence[Term]:
-        return () if names.isdisjoint(node.free) or bound_names(node) else children(node)
+        return () if type(node) in _BOUND else [part for part in children(node) if not untouched(part.free)]
 
-    def change(node: Term, new: Term) -> Term:
-        if names.isdisjoint(node.free):
-            return node
+    made: dict[Term, Term] = {}
+    for node in postorder(term, below=below):
         if isinstance(node, Var):
-            return mapping[node.name]
-        return _in_scopes(node, mapping, _fresh_names(node, incoming)) if bound_names(node) else new
-
-    return transform(term, change, below)
+            made[node] = mapping[node.name]
+        elif type(node) in _BOUND:
+            made[node] = _in_scopes(node, mapping, _fresh_names(node, incoming))
+        else:
+            made[node] = rebuild(node, tuple([made.get(part, part) for part in children(node)]))
+    return made[term]
 
 
 def _fresh_names(binder: Term, taken: Set[str]) -> dict[str, str]:

@@ -328,20 +328,26 @@ class _Walk:
                 functions[param] = arg
             else:
                 mapping[param] = arg
-        return body, mapping, functions, {o: var(p) for p, o in zip(params, own, strict=True)}
+        return body, mapping, functions, _renamed(own, params)
 
     def apart(self, body: Term, params: tuple[str, ...]) -> tuple[Term, tuple[str, ...]]:
         """A copy of the body in which neither parameters nor bound variables are called like anything met so far."""
         met = self.taken | self.box.keys()
-        taken = met.union(body.free, *(n.variables for n in postorder(body) if isinstance(n, Integral)))
-        own: list[str] = []
+        bound = {name for node in postorder(body) if isinstance(node, Integral) for name in node.variables}
+        taken, own = met.union(body.free, bound), list[str]()
         for param in params:
             own.append(fresh(param, taken))
             taken.add(own[-1])
-        body = substitute(body, {p: var(o) for p, o in zip(params, own, strict=True)})
-        body = transform(body, lambda _, new: bound_apart(new, met) if isinstance(new, Integral) else new)
+        body = substitute(body, _renamed(params, own))
+        if not met.isdisjoint(bound):
+            body = transform(body, lambda _, new: bound_apart(new, met) if isinstance(new, Integral) else new)
         self.taken |= set(own)
         return body, tuple(own)
+
+
+def _renamed(names: Iterable[str], others: Iterable[str]) -> dict[str, Term]:
+    """Variables by the names that they had, of those that have others now."""
+    return {name: var(other) for name, other in zip(names, others, strict=True) if name != other}
 
 
 def _decided_by(surface: Term, functions: Mapping[str, Term]) -> bool:
