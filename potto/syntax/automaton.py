@@ -52,31 +52,33 @@ class Automaton:
     def run(self, tokens: list[Token], index: int) -> int:
         """Shift tokens from `index` on; gives the index of the token without an action, or past the end."""
         rows, states, values, context = self.rows, self.states, self.values, self.context
-        reductions, end = _reductions(), self.end
+        reductions, end, state = _reductions(), self.end, self.states[-1]
         count = len(tokens)
         while index < count:
             token = tokens[index]
             kind = token[0]
             while True:
-                action = rows[states[-1]].get(kind)
+                action = rows[state].get(kind)
                 if action is None:
                     return index
                 if action >= 0:
-                    states.append(action)
+                    state = action
+                    states.append(state)
                     values.append(token)
                     break
                 size, origin, build_value = reductions[~action]
                 if size == 1:
                     if build_value is not None:
                         values[-1] = build_value(context, values[-1:])
-                    states[-1] = rows[states[-2]][origin]
+                    state = states[-1] = rows[states[-2]][origin]
                 else:
                     taken = values[-size:] if size else []
                     if size:
                         del states[-size:], values[-size:]
                     values.append(build_value(context, taken))  # type: ignore[misc]
-                    states.append(rows[states[-1]][origin])
-                if kind == "$END" and states[-1] == end:
+                    state = rows[states[-1]][origin]
+                    states.append(state)
+                if state == end and kind == "$END":
                     return count
             index += 1
         return index
