@@ -43,6 +43,7 @@ from potto.types.types import (
     Diffeo,
     Function,
     Parameter,
+    Real,
     TupleOf,
     Type,
     derivative_type,
@@ -129,7 +130,7 @@ class Shapes:
         match term:
             case Global(module=file, name=name):
                 type = self.definition(self.db, file, name)
-                return open_type(type, 1) if any(isinstance(p, TypeVar) for p in _leaves(type)) else type
+                return open_type(type, 1) if _has_variables(type) else type
             case Deriv(function=function):
                 return derivative_type(self._called(function))
             case App(function=function, args=args) if not isinstance(function, Lam):
@@ -155,15 +156,18 @@ def _part(whole: Type, index: int) -> Type:
     return REAL
 
 
-def _leaves(type: Type) -> list[Type]:
-    found, waiting = list[Type](), [type]
+def _has_variables(type: Type) -> bool:
+    """Whether a type is one of any types."""
+    waiting = [type]
     while waiting:
-        here = resolve(waiting.pop())
-        below = parts(here)
-        waiting += below
-        if not below:
-            found.append(here)
-    return found
+        here = waiting.pop()
+        if isinstance(here, Real):  # as most are
+            continue
+        here = resolve(here)
+        if isinstance(here, TypeVar):
+            return True
+        waiting += parts(here)
+    return False
 
 
 def is_vector(type: Type) -> bool:
