@@ -11,8 +11,9 @@ def _product_partials(*args: Term) -> Terms:
 
 
 def _quotient_partials(a: Term, b: Term) -> Terms:
-    # (a/b)/b, not a/b^2: b^2 overflows or vanishes long before the quotient does.
-    return div(ONE, b), neg(div(div(a, b), b))
+    # Not a/b^2: b^2 overflows or vanishes long before the quotient does. One division less than (a/b)/b.
+    rate = div(ONE, b)
+    return rate, neg(mul(div(a, b), rate))
 
 
 def _power_partials(base: Term, exponent: Term) -> Terms:
