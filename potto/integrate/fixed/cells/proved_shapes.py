@@ -8,15 +8,13 @@ which tell less, would have them take. Where nothing can be proved, coefficients
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from msgspec import Struct
 
-from potto.integrate.columns import distinct
+from potto.integrate.columns import distinct, places_of
 from potto.integrate.fixed.cells.product_rule import ProductRule
 from potto.integrate.fixed.cells.topologies import Alike
 from potto.integrate.fixed.regions import LOOSEST, MARGIN, MOST_REGIONS
@@ -24,7 +22,7 @@ from potto.integrate.fixed.straight import StraightIntegral
 from potto.integrate.pieces import Evaluator
 from potto.integrate.rules.proved_orders import FrameCell as Stretch
 from potto.integrate.rules.proved_orders import proved_of_each
-from potto.kernels.cells import Array, Cell, Ints, Number, Value
+from potto.kernels.cells import Array, Bools, Cell, Ints, Number, Value
 from potto.kernels.making import making
 
 # How many cells in a region pay for its proof, which takes 0.1 ms where many are proved at once, and into how many
@@ -63,38 +61,50 @@ def proved_rules(
 
     exact: the nodes of variables in which the integrand is a polynomial.
     """
-    index = np.argsort(cell.between, kind="stable")
-    if index.size < FEW or any(map(any, cell.turning)):
-        return [], index
-    edges = (np.flatnonzero(np.diff(cell.between.take(index))) + 1).tolist()
-    groups = [(start, stop, _stretch(cell, int(index[start])))
-              for start, stop in itertools.pairwise((0, *edges, index.size))]  # fmt: skip
-    members = cell.members.take(index)
-    values = {name: _of(env[name].v, members) for name in _names(plan, groups)}  # type: ignore[union-attr]
-    grid = _grid(values, index.size)
+    count, everybody = cell.members.size, np.arange(cell.members.size)
+    if count < FEW or any(map(any, cell.turning)):
+        return [], everybody
+    shapes = distinct(cell.between)
+    shape, first = places_of(shapes, cell.between), np.empty(shapes.size, dtype=np.int64)
+    first[shape] = everybody  # any of them
+    stretches = [_stretch(cell, number) for number in first.tolist()]
+    values = {name: _of(env[name].v, cell.members) for name in _names(plan, stretches)}  # type: ignore[union-attr]
+    grid = _grid(values, count)
     if grid is None:
-        return [], index
-    code, places = _regions(values, grid, index.size)
-    tolerance = MARGIN * min(machine.rtol, LOOSEST) * (grid.narrowest if machine.directions else 1.0)
-    nodes, error = np.zeros((len(plan.variables), index.size), dtype=np.int64), np.zeros(index.size)
-    for start, stop, stretch in groups:
-        if stop - start < grid.least:
-            continue
-        own = code[start:stop]
-        those = distinct(own)
-        orders, errors = _orders(plan, stretch, exact, grid, places.take(those, 1), tolerance)
-        at = np.searchsorted(those, own)
-        nodes[:, start:stop], error[start:stop] = orders.take(at, 1), errors.take(at)
-    beyond = np.zeros((1 + machine.directions, cell.members.size))
-    beyond[0, index] = error
+        return [], everybody
+    region, places = _regions(values, grid, count)
+    kind = shape * places.shape[1] + region
+    counts = np.bincount(kind, minlength=shapes.size * places.shape[1])
+    nodes, error = _proofs(plan, stretches, exact, grid, places, counts, machine)
+    beyond = np.empty((1 + machine.directions, count))
+    beyond[0] = error.take(kind)
     for d in range(machine.directions):
-        beyond[1 + d, index] = error * _speed(grid, env, members, d)
+        beyond[1 + d] = beyond[0] * _speed(grid, env, cell.members, d)
     exactly = (True,) * len(plan.variables)
-    parts = _shared(nodes)
     rules = [
-        (ProductRule(plan, cell, orders, exactly, machine, tight, beyond), index[own]) for orders, own in parts.items()
-    ]
-    return rules, index[nodes[0] == 0]
+        (ProductRule(plan, cell, orders, exactly, machine, tight, beyond),
+         everybody if own.all() else np.flatnonzero(own.take(kind)))
+        for orders, own in _shared(nodes, counts).items()
+    ]  # fmt: skip
+    return rules, np.flatnonzero((nodes[0] == 0).take(kind))
+
+
+def _proofs(
+    plan: StraightIntegral, stretches: Sequence[Stretch], exact: Sequence[int | None], grid: _Grid, places: Ints,
+    counts: Ints, machine: Evaluator,
+) -> tuple[Ints, Array]:  # fmt: skip
+    """Nodes per variable (D, K) and bounds of the error (K,) for cells of each shape in each region, by how many of
+    them there are (K,); no nodes where nothing is proved, or it would not pay."""
+    nodes, error = np.zeros((len(plan.variables), counts.size), dtype=np.int64), np.zeros(counts.size)
+    tolerance = MARGIN * min(machine.rtol, LOOSEST) * (grid.narrowest if machine.directions else 1.0)
+    each = counts.reshape(len(stretches), -1)
+    for number, (stretch, own) in enumerate(zip(stretches, each, strict=True)):
+        if own.sum() >= grid.least:
+            there = np.flatnonzero(own)
+            orders, errors = _orders(plan, stretch, exact, grid, places.take(there, 1), tolerance)
+            there += number * own.size
+            nodes[:, there], error[there] = orders, errors
+    return nodes, error
 
 
 def _stretch(cell: Alike, number: int) -> Stretch:
@@ -103,9 +113,8 @@ def _stretch(cell: Alike, number: int) -> Stretch:
     return Stretch(tuple((low, high) for low, high in rows), cell.face)
 
 
-def _names(plan: StraightIntegral, groups: Sequence[tuple[int, int, Stretch]]) -> list[str]:
+def _names(plan: StraightIntegral, stretches: Sequence[Stretch]) -> list[str]:
     """The parameters of some cells."""
-    stretches = [stretch for _, _, stretch in groups]
     ends = {plan.items[i][row] for stretch in stretches for i, pair in enumerate(stretch.rows) for row in pair}
     terms = {*ends, *(stretch.body for stretch in stretches)}
     return sorted({name for term in terms for name in term.free}.difference(plan.variables))
@@ -123,20 +132,19 @@ def _speed(grid: _Grid, env: dict[str, Value], members: Ints, direction: int) ->
     return speed
 
 
-def _shared(nodes: Ints) -> dict[tuple[int, ...], Any]:
-    """By orders, of which there are few, an index of the cells that get as many nodes: at least those that are asked
-    for (D, M)."""
-    most = tuple(nodes.max(axis=1).tolist())
-    if nodes[0].all() and math.prod(most) * nodes.shape[1] - int(nodes.prod(axis=0).sum()) < CALL:
-        return {most: slice(None)}
+def _shared(nodes: Ints, cells: Ints) -> dict[tuple[int, ...], Bools]:
+    """By orders, of which there are few, which kinds of cells (K,) get as many nodes: at least those that are asked for
+    (D, K). cells: how many there are of each kind."""
+    most, here = tuple(nodes.max(axis=1).tolist()), cells > 0
+    if nodes[0, here].all() and math.prod(most) * int(cells.sum()) - int(nodes.prod(axis=0) @ cells) < CALL:
+        return {most: np.ones(cells.size, dtype=bool)}
     base = max(most) + 1
-    kind = np.zeros(nodes.shape[1], dtype=np.int64)
+    kind = np.zeros(cells.size, dtype=np.int64)
     for row in nodes:
         kind = kind * base + row
     counts = {
-        tuple(number // base**i % base for i in reversed(range(len(nodes)))): int(count)
-        for number, count in enumerate(np.bincount(kind))
-        if number and count
+        tuple(number // base**i % base for i in reversed(range(len(nodes)))): int(cells[kind == number].sum())
+        for number in distinct(kind[here & (nodes[0] > 0)]).tolist()
     }
     parts = {orders: [orders] for orders in counts}
     settled: dict[tuple[int, ...], list[tuple[int, ...]]] = {}
@@ -197,7 +205,7 @@ def _regions(values: dict[str, Number], grid: _Grid, cells: int) -> tuple[Ints, 
     for least, count in reversed(sizes):
         places.append(rest % count + least)
         rest = rest // count
-    number = np.broadcast_to(np.searchsorted(known, code), cells)
+    number = np.broadcast_to(places_of(known, code), cells)
     return number, np.array(places[::-1], dtype=np.int64).reshape(len(sizes), known.size)
 
 
