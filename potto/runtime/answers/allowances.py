@@ -1,6 +1,7 @@
 """How large an error may be of what is 0, or nearly, because its parts cancel.
 
-Owns `Allowance`, what the integrals of an evaluation leave of it, and `allowance`, that of integrals by themselves. No
+Owns `Allowance`, what the integrals of an evaluation leave of it, `LeftBySums`, which is worked out when it is asked
+for, and `allowance`, that of integrals by themselves. No
 error is relative to what has cancelled. It is measured by what is added up without regard to sign: it has to be within
 `rtol` of it, and within CANCELS, which is what rounding leaves. That is no licence to lose a small summand beside large
 ones (1e16 - 1e16 + 1): where the integrand adds anything, what is added up counts as UNIT at most, so that CANCELS is
@@ -15,7 +16,7 @@ integrals, scaled as they are.
 from __future__ import annotations
 
 import math
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -41,7 +42,7 @@ class Allowance(Struct, frozen=True):
     kept: Any = True
     finite: Any = True
 
-    def and_of(self, other: Allowance) -> Allowance:
+    def and_of(self, other: Allowed) -> Allowed:
         """That of what is made of the integrals of both; of batches that do not go together the least."""
         if self is NOTHING:
             return other
@@ -111,13 +112,69 @@ class Allowance(Struct, frozen=True):
 NOTHING = Allowance()
 
 
-def left_by(term: Integral, sums: Sums, rtol: float, shape: tuple[int, ...]) -> Allowance:
+class LeftBySums(Struct, frozen=True, dict=True):
+    """The allowance that a batch of integrals of this shape leaves. Nobody asks for that of members that are accurate,
+    as mostly all are, and of large batches it takes as long as the integrals."""
+
+    term: Integral
+    sums: Sums
+    rtol: float
+    shape: tuple[int, ...]
+
+    @cached_property
+    def whole(self) -> Allowance:
+        return _left(self.term, self.sums, self.rtol, self.shape)
+
+    @property
+    def most(self) -> Any:
+        return self.whole.most
+
+    @property
+    def kept(self) -> Any:
+        return self.whole.kept
+
+    @property
+    def finite(self) -> Any:
+        return self.whole.finite
+
+    @property
+    def holds(self) -> tuple[Any, Any]:
+        return self.whole.holds
+
+    def and_of(self, other: Allowed) -> Allowed:
+        return self.whole.and_of(other)
+
+    def over(self, shape: tuple[int, ...]) -> Allowed:
+        return self if shape == self.shape else self.whole.over(shape)
+
+    def of(self, members: Bools) -> Allowance:
+        part = self.sums.pick(members.reshape(-1).nonzero()[0])
+        return _left(self.term, part, self.rtol, part.v.shape[-1:])
+
+    def added(self, shape: tuple[int, ...], count: int, those: Bools | None = None) -> Allowance:
+        return self.whole.added(shape, count, those)
+
+    def put(self, members: Ints, size: int, shape: tuple[int, ...]) -> Allowance:
+        return self.whole.put(members, size, shape)
+
+    def added_up(self, rtol: float) -> Any:
+        return self.whole.added_up(rtol)
+
+
+Allowed = Allowance | LeftBySums
+
+
+def left_by(term: Integral, sums: Sums, rtol: float, shape: tuple[int, ...]) -> Allowed:
     """What a batch of integrals leaves to what is made of them."""
-    within = allowance(term, sums, rtol)
-    if sums.v.size == 1:
-        most = float(np.max(within))
-        exact = bool((sums.e <= most).all() and (sums.et <= most).all())
-        return Allowance(most, exact, bool(np.isfinite(sums.v).all() and np.isfinite(sums.t).all()))
+    if sums.v.size > 1:
+        return LeftBySums(term, sums, rtol, shape) if shape else _left(term, sums, rtol, shape)
+    most = float(np.max(allowance(term, sums, rtol)))
+    exact = bool((sums.e <= most).all() and (sums.et <= most).all())
+    return Allowance(most, exact, bool(np.isfinite(sums.v).all() and np.isfinite(sums.t).all()))
+
+
+def _left(term: Integral, sums: Sums, rtol: float, shape: tuple[int, ...]) -> Allowance:
+    within = np.broadcast_to(allowance(term, sums, rtol), sums.v.shape[-1:])
     kept: Bools = _everywhere(sums.e <= within) & _everywhere(sums.et <= within)
     finite: Bools = np.ones(kept.shape, dtype=bool)
     if not math.isfinite(np.add.reduce(sums.v, None) + np.add.reduce(sums.t, None)):  # seldom, in large batches

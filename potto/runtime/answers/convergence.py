@@ -31,7 +31,7 @@ from potto.integrate.events import (
 from potto.integrate.pieces import Sums, added_up, together
 from potto.kernels.cells import Array, Bools, Number, Value
 from potto.projects.settings import Settings
-from potto.runtime.answers.allowances import Allowance, allowance
+from potto.runtime.answers.allowances import Allowed, allowance
 
 # What is a speck, beside the largest of a batch.
 SPECK = 1e-15
@@ -89,19 +89,19 @@ def rounded(sums: Sums) -> Bools:
     return out
 
 
-def missed(value: Any, error: Any, allowed: Allowance, settings: Settings, drawn: bool) -> Shortfalls:
+def missed(value: Any, error: Any, allowed: Allowed, settings: Settings, drawn: bool) -> Shortfalls:
     """Why numbers are not as accurate as was asked for. `drawn`: they are made of samples."""
     rtol = settings.asked(drawn)
     if isinstance(value, float) and isinstance(error, float) and error <= rtol * abs(value) < np.inf:
         return {}
-    v, e = np.abs(np.asarray(value, dtype=float)), np.asarray(error, dtype=float)
-    v, e = np.broadcast_arrays(v, e)
-    limit = rtol * v
-    bad = np.asarray(~(e <= limit))
+    v, e = np.broadcast_arrays(np.abs(np.asarray(value, dtype=float)), np.asarray(error, dtype=float))
+    limit = np.asarray(rtol * v)
+    fine = np.asarray(e <= limit)
     if not limit.max(initial=0.0) < np.inf:  # seldom, in large batches
-        bad |= ~(limit < np.inf)
-    if not bad.any():
+        fine &= limit < np.inf
+    if fine.all():
         return {}
+    bad = np.asarray(~fine)
     size, off = v[bad], e[bad]  # few of a large batch
     within = allowed.over(v.shape).of(bad).error(settings.rtol)
     wrong = ~((off <= settings.atol) | (off <= rtol * size) | (off <= within)) | np.isnan(size)

@@ -21,7 +21,7 @@ from potto.integrate.decomposition.root_isolation import Isolated
 from potto.integrate.events import Events, OneSidedDerivatives, Shortfall, TwoSided
 from potto.kernels.cells import Array, Value
 from potto.kernels.tape import Node
-from potto.runtime.answers.allowances import NOTHING, Allowance
+from potto.runtime.answers.allowances import NOTHING, Allowed
 from potto.runtime.answers.convergence import Shortfalls, merged
 
 
@@ -131,7 +131,7 @@ class Record(Struct):
     taped: list[tuple[Node, Any]] = []
     methods: set[str] = set()
     second: bool = False
-    allowed: Allowance = NOTHING
+    allowed: Allowed = NOTHING
     start: int = 0
     members: int = 1
     cells: int = 0

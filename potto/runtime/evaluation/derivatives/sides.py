@@ -30,7 +30,7 @@ from potto.kernels.cells import (
     pad,
 )
 from potto.kernels.errors import Coincidence
-from potto.runtime.answers.allowances import NOTHING
+from potto.runtime.answers.allowances import NOTHING, Allowed
 from potto.runtime.evaluation.derivatives.beside import SAME as ALIKE
 from potto.runtime.evaluation.derivatives.beside import Parts, approached, moved, one_direction, parameter_step
 from potto.runtime.evaluation.linker import Linker
@@ -123,7 +123,7 @@ def _both(machine: Machine, given: Value, members: Ints | None, beside: Callable
     """What `beside` finds on either side for some members by themselves. The record is left as it was, but that what is
     added up there counts for how much may be off."""
     record, batch = machine.record, _batch(given)
-    allowed = NOTHING
+    allowed: Allowed = NOTHING
     kept = record.shortfalls, record.edges, record.allowed
     try:
         with nullcontext(machine.apart()) if members is None else machine.among(members) as apart:
