@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from potto.integrate.columns import run_of
+from potto.integrate.columns import distinct, places_of, run_of
 from potto.integrate.pieces import Sums
 
 
@@ -45,3 +45,13 @@ def test_only_what_is_in_order_is_a_run() -> None:
     assert run_of(np.array([2, 3, 4])) == slice(2, 5)
     assert run_of(np.array([2, 4, 3, 5])) is None
     assert run_of(np.array([0, 2, 2])) is None
+
+
+@pytest.mark.parametrize("kind", [np.int64, np.uint16])
+@pytest.mark.parametrize("step", [1, 7, 10_000])
+def test_places_among_the_numbers_that_there_are(kind: type, step: int) -> None:
+    numbers = (np.random.default_rng(0).integers(0, 6, 300) * step + 3).astype(kind)
+    known = distinct(numbers)
+    assert known.tolist() == sorted(set(numbers.tolist()))
+    assert (known[places_of(known, numbers)] == numbers).all()
+    assert places_of(known, numbers[:2]).tolist() == [known.tolist().index(n) for n in numbers[:2].tolist()]
