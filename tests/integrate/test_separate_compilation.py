@@ -12,6 +12,7 @@ import pytest
 import potto
 from potto.calculus.algebra import degree
 from potto.calculus.inlining import expand
+from potto.calculus.surfaces import discontinuities
 from potto.calculus.surfaces.discontinuities import ends_of_domain
 from potto.core import binders, packing
 from potto.core.terms import Term, rebuild
@@ -93,6 +94,7 @@ def test_what_holds_no_call_is_not_rebuilt_for_another_shader(monkeypatch: pytes
         (46, binders, "bound_names", 0),  # there are none in it
         (47, degree, "_node", 6),  # of the shader's body and the product that it stands in
         (48, packing._Writer, "fields", 0),  # the outline's bytes are those of the first
+        (49, discontinuities, "centers", 4),  # of the shader's builtins
     ],
 )
 def test_what_another_shader_leaves_as_it_was_is_not_looked_through(

@@ -115,8 +115,23 @@ def _ends_of_domain(surface: Term) -> Iterator[Term]:
                     yield from (piece for piece in pieces(end) if piece.free)
 
 
+@lru_cache(maxsize=4096)
+def _telling(term: Term) -> tuple[Prim | Integral, ...]:
+    """The builtins and integrals of a term that may jump or bend somewhere: of hundreds of sums and products none."""
+    parts = layout(term).order
+    return tuple(node for node in parts if isinstance(node, Integral) or (isinstance(node, Prim) and _turns(node)))
+
+
+def _turns(node: Prim) -> bool:
+    entry = PRIMITIVES[node.op]
+    turning = entry.kinks(*node.args) or entry.steps(*node.args) or centers(node) or entry.edges(*node.args)
+    return bool(node.free and turning)
+
+
 def _carried_out(f: Finding, resolve: Resolve) -> Finding:
     critical = f.critical
+    if critical is None and not holds_call(f.surface):
+        return f
     if critical is not None:
         critical = critical.mapped(lambda equation: carried_out(equation, resolve, ROUNDS))
     return replace(f, surface=carried_out(f.surface, resolve, ROUNDS), critical=critical)
@@ -139,13 +154,9 @@ class _Search(Struct, frozen=True):
     def term(self, term: Term, mapping: dict[str, Term], path: tuple[int, ...], depth: int) -> Iterator[Finding]:
         if depth > DEEPEST:
             raise TooDeep
-        shape = layout(term)
-        for node in shape.order:
-            if isinstance(node, Prim):
-                yield from self.builtin(node, mapping)
-            elif isinstance(node, Integral):
-                yield from self.nested(node, mapping)
-        for number, site in enumerate(shape.sites):
+        for node in _telling(term):
+            yield from self.builtin(node, mapping) if isinstance(node, Prim) else self.nested(node, mapping)
+        for number, site in enumerate(layout(term).sites):
             here = (*path, number)
             match site:
                 case Side(branch=branch):
@@ -157,8 +168,6 @@ class _Search(Struct, frozen=True):
 
     def builtin(self, node: Prim, mapping: dict[str, Term]) -> Iterator[Finding]:
         entry = PRIMITIVES[node.op]
-        if not node.free:
-            return
         for kink in entry.kinks(*node.args):
             for piece in self.pieces(kink, mapping):
                 yield Finding("kink", piece)
