@@ -1,8 +1,10 @@
-"""Integrals over normal numbers of which only a combination matters: a number that is normal as well.
+"""Integrals over normal numbers of which only a combination matters: a number that is normal as well; and lognormal
+numbers by their logarithms, which are normal.
 
 Owns `combined`. Where x and y have independent normal densities and the rest knows a x + b y alone, that is normal with
 mean a m_x + b m_y and variance a^2 s_x^2 + b^2 s_y^2: one variable less, and none at all for the sum of many. So a
-distance between two points that are both uncertain takes two variables, not four.
+distance between two points that are both uncertain takes two variables, not four. The density of a lognormal number
+goes to 0 like no power, and falls off slowly: among other variables its logarithm takes a third of the nodes.
 """
 
 from __future__ import annotations
@@ -43,12 +45,15 @@ from potto.core.terms import (
     postorder,
     prim,
     rebuild,
+    replaced,
     sub,
+    substitute,
     var,
 )
 
 KINDS = (Const, Var, Prim, Branch, Delta, If, App, Global)
 TWO = const(2.0)
+LOGARITHM = "@log"  # behind the name of a variable
 TOGETHER = "@together"  # behind the name of the first variable of a combination
 WIDE = (3.0, 8.0)  # where rules look at a normal density, in standard deviations: as the measure does
 
@@ -63,7 +68,10 @@ class _Normal(Struct, frozen=True):
 
 @lru_cache(maxsize=4096)
 def combined(term: Integral) -> Integral:
-    """An equal integral over fewer variables; the same term where none are combined."""
+    """An equal integral over fewer variables, and by logarithms; the same term where none are combined or lognormal."""
+    if len(term.variables) > 1:
+        for name in term.variables:
+            term = _by_logarithm(term, name) or term
     while (found := _one_less(term)) is not None:
         term = found
     return term
@@ -132,6 +140,36 @@ def _normal(term: Integral, every: Sequence[Term], name: str) -> _Normal | None:
         width = prim("sqrt", div(ONE, neg(mul(TWO, steep, slope, slope))))
         return _Normal(at, neg(div(line.rest, slope)), simplify(width))
     return None
+
+
+def _by_logarithm(term: Integral, name: str) -> Integral | None:
+    """The integral over the logarithm of a variable, where that is normal, instead of the variable."""
+    place = term.variables.index(name)
+    others = [end for pair in term.bounds for end in pair] + [hint for hints in term.hints for hint in hints]
+    log = prim("log", var(name))
+    if (
+        term.bounds[place] != (ZERO, INF)
+        or any(name in part.free for part in others)
+        or log not in postorder(term.body)
+    ):
+        return None
+    u = name + LOGARITHM
+    every = list(factors(term.body))
+    inverse = div(ONE, var(name))
+    whole = [factor for factor in every if factor is not inverse] if every.count(inverse) == 1 else [*every, var(name)]
+    body = substitute(replaced(mul(*whole), {log: var(u)}), {name: prim("exp", var(u))})
+    rows = zip(term.variables, term.bounds, term.hints, strict=True)
+    turned = [
+        (u, (neg(INF), INF), tuple(map(_log, hints))) if v == name else (v, pair, hints) for v, pair, hints in rows
+    ]
+    variables, bounds, hints = (tuple(column) for column in zip(*turned, strict=True))
+    found = integral(variables, bounds, body, hints)
+    assert isinstance(found, Integral)
+    return found if _normal(found, list(factors(body)), u) is not None else None
+
+
+def _log(term: Term) -> Term:
+    return term.args[0] if isinstance(term, Prim) and term.op == "exp" else prim("log", term)
 
 
 def _squared(term: Term) -> tuple[Term, ...]:
