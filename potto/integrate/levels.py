@@ -14,7 +14,7 @@ from msgspec import Struct
 from potto.calculus.decomposition.circular_regions import polynomial
 from potto.calculus.decomposition.surface_cuts import CircularRegion, Cut
 from potto.calculus.decomposition.sweep import Level
-from potto.core.terms import Lam, Term, function_of, neg, prim, tuple_
+from potto.core.terms import INF, Lam, Term, function_of, neg, postorder, prim, tuple_
 
 # What the places are that are no cuts, of which none has a number below 0: hints, and such with which no nodes move.
 HINT, RESTING = -1, -2
@@ -61,6 +61,11 @@ class LevelPlan(Struct, frozen=True, dict=True):
         """Whether numbers have to find what decides, or bends, along the variable."""
         families = any(not self.level.cuts[number].center for number, _ in self.families)
         return families or any(not cut.center for cut in self.searched)
+
+    @cached_property
+    def endless(self) -> bool:
+        """Whether its range is written as an infinite one."""
+        return any(node is INF for node in postorder(self.level.lo, self.level.hi))
 
     @cached_property
     def bounds(self) -> Lam:

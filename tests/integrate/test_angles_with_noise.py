@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 import potto
+from potto.integrate.decomposition import critical_places
 
 Between = Callable[[Any, Any], Any]  # the probability between two places
 
@@ -120,6 +121,90 @@ def test_in_two_variables(body: str, inner: Callable[[Any, Any], Any], clip: Any
         value, slope = exact(mp.mpf(0.8)), mp.diff(exact, mp.mpf(0.8), h=mp.mpf("1e-6"))  # to 1e-12
     assert abs(found.value - value) <= found.error + 1e-14 <= 1e-9
     assert abs(found.tangent - slope) <= found.tangent_error + 1e-11 <= 1e-8 and found.converged
+
+
+ARM = """
+def f(a, b, r)
+    integral (x ~ normal(a, 0.1), y ~ normal(b, 0.2))
+        [(cos(x) + cos(y) - 1)^2 + (sin(x) + sin(y) - 1)^2 < r^2] d(x, y)
+"""
+
+
+def reach(a: Any, b: Any, r: Any) -> Any:
+    """The probability that an arm of two links, whose angles are normal, comes within r of (1, 1): that of the second
+    angle, for each first one. What it has in other turns than the nearest is below 1e-41."""
+    second = normal(b, mp.mpf(0.2))
+
+    def sight(x: Any) -> tuple[Any, Any]:
+        """Of the second angles that do: the cosine of how far they are from their middle at most, and their middle."""
+        left = 1 - mp.cos(x), 1 - mp.sin(x)
+        far = mp.hypot(*left)
+        return (1 + far**2 - r**2) / (2 * far), mp.atan2(left[1], left[0])
+
+    def inner(x: Any) -> Any:
+        cosine, middle = sight(x)
+        off = mp.acos(min(cosine, 1))
+        return mp.npdf(x, a, mp.mpf(0.1)) * second(middle - off, middle + off)
+
+    start, end = (mp.findroot(lambda x: sight(x)[0] - 1, near) for near in (-0.3, 0.3))
+    return mp.quad(inner, [start, -0.1, 0, 0.1, 0.2, end])
+
+
+def test_an_arm_with_noise_in_both_joints() -> None:
+    """Both ranges are infinite, and the condition is periodic in both."""
+    f, at = potto.compile(ARM).f, (0.1, 1.5, 0.3)
+    found = potto.grad(f, ["a", "b", "r"])(*at)
+    with mp.workdps(25):
+        exact = tuple(map(mp.mpf, at))
+        value = reach(*exact)
+        slopes = [mp.diff(reach, exact, n, h=mp.mpf("1e-6")) for n in ((1, 0, 0), (0, 1, 0), (0, 0, 1))]  # to 1e-12
+    assert abs(found.value - value) <= found.error + 1e-15 <= 1e-10
+    for slope, error, truth in zip(found.tangent, found.tangent_error, slopes, strict=True):
+        assert abs(slope - truth) <= error + 1e-11 <= 1e-8
+    assert found.converged and found.evals < 100_000
+
+
+def test_bars_hold_where_the_ends_of_sections_are_not_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A piece all of whose nodes lie beyond the end of a section does not see it, but its neighbour does."""
+    monkeypatch.setattr(critical_places, "BOXES", 1)
+    monkeypatch.setattr(critical_places, "BOXES_EACH", 1)
+    f = potto.compile(ARM).f
+    with mp.workdps(20):
+        exact = reach(mp.mpf(0.1), mp.mpf(1.5), mp.mpf(0.3))
+    for rtol in (1e-4, 1e-6, 1e-8):
+        with potto.settings(rtol=rtol):
+            found = f(0.1, 1.5, 0.3)
+        assert abs(found.value - exact) <= found.error < 1e-3
+        assert found.converged == (found.error <= rtol * found.value)
+
+
+@pytest.mark.parametrize(("half_line", "below"), [("[-inf, 0]", True), ("[0, inf]", False)])
+def test_waves_over_half_a_plane(half_line: str, below: bool) -> None:
+    """A density is told from nothing as far out as numbers go: the turns that it leaves are all that count."""
+    f = potto.compile(f"def f(a) integral ([-inf, inf], {half_line}) exp(-x^2 - y^2)*[sin(5*x*y) + x < a] d(x, y)").f
+
+    def half(y: Any) -> Any:
+        """Of exp(-y^2), from the bound that is no infinity."""
+        return mp.sqrt(mp.pi) / 2 * mp.erf(y)
+
+    def inner(x: Any, a: Any) -> Any:
+        """Where the sine is too large it is so from asin(c) to pi - asin(c), and in every turn."""
+        c, every = a - x, mp.sqrt(mp.pi) / 2
+        if abs(c) >= 1 or not x:
+            return mp.exp(-(x**2)) * (every if c > 0 else 0)
+        left_out = mp.mpf(0)
+        turns = int(2 + 5 * abs(x) * 7 / (2 * mp.pi))  # exp(-7^2) is below 1e-21
+        for k in range(-turns, turns + 1):
+            ends = sorted((2 * mp.pi * k + u) / (5 * x) for u in (mp.asin(c), mp.pi - mp.asin(c)))
+            low, high = (min(y, 0) if below else max(y, 0) for y in ends)
+            left_out += half(high) - half(low)
+        return mp.exp(-(x**2)) * (every - left_out)
+
+    found = f(0.3)
+    with mp.workdps(20):
+        a = mp.mpf(0.3)
+        exact = mp.quad(lambda x: inner(x, a), [-8, a - 1, -0.4, 0, a, 0.8, a + 1])
+    assert abs(found.value - exact) <= found.error + 1e-13 <= 1e-9 and found.converged
 
 
 def test_arrays_of_means_near_and_far() -> None:

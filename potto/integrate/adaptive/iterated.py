@@ -18,8 +18,8 @@ from potto.integrate.decomposition.corners import corner_rows, within_walls
 from potto.integrate.decomposition.covered import uncovered
 from potto.integrate.decomposition.critical_places import critical_rows
 from potto.integrate.decomposition.cuts import Cuts, at_rest, finite_speeds, frame_rows, on_bounds, segments, standing
-from potto.integrate.decomposition.effective_range import concentrated, pulled_in
-from potto.integrate.decomposition.meetings import Row
+from potto.integrate.decomposition.effective_range import Ranges, pulled_in, reaches
+from potto.integrate.decomposition.meetings import Row, as_array
 from potto.integrate.decomposition.sections import searched_rows
 from potto.integrate.decomposition.vanishing import vanishes
 from potto.integrate.degenerate.coincidences import count_places, count_slivers, note_folds
@@ -241,13 +241,28 @@ class Iteration(Struct):
         critical = level.level.critical
         if not (level.families or level.searched or critical):
             return [], None
-        number = next((n for n, own in enumerate(self.plan.levels) if own is level), None)
-        near = None if number is None else concentrated(self.plan, number, env, lo, hi, batch)
-        lo, hi, lost = near or (lo, hi, None)
-        lost = None if lost is None else self.further_in * lost
+        near, lost = self.ranges(level, env, lo, hi, batch)
+        if level.level.variable in near:
+            lo, hi = map(Cell, near[level.level.variable])
         summed = self.plan.over is not None and level is self.plan.levels[-1]
         rows = searched_rows(level, env, lo, hi, batch, machine, summed)
-        return (rows + critical_rows(level, env, lo, hi, batch, machine) if critical else rows), lost
+        if critical:
+            rows += critical_rows(level, env, lo, hi, near, batch, machine)
+        return rows, None if lost is None else self.further_in * lost
+
+    def ranges(
+        self, level: LevelPlan, env: dict[str, Value], lo: Cell, hi: Cell, batch: int
+    ) -> tuple[Ranges, Array | None]:
+        """How much of infinite ranges matters, of a variable and of those further in on which its critical places
+        depend, and what is left out of it at most: (B,)."""
+        number = next((n for n, own in enumerate(self.plan.levels) if own is level), None)
+        if number is None:
+            return {}, None
+        low, high = (as_array(pick(lo.v, hi.v), batch) for pick in (np.minimum, np.maximum))
+        further = range(number + 1, len(self.plan.levels)) if level.level.critical else ()
+        if not (np.isinf(low).any() or np.isinf(high).any() or any(self.plan.levels[n].endless for n in further)):
+            return {}, None
+        return reaches(self.plan, env, (number, *further), (low, high), batch)
 
     def sides_of(self, scene: IteratedVariable, seg: Segments) -> Settled:
         """The sides of all surfaces decided so far: those of this variable from the segments' middles."""

@@ -18,6 +18,7 @@ from msgspec import Struct
 from potto.calculus.decomposition.critical import Critical, slopes_of
 from potto.core.terms import Term, function_of, tuple_
 from potto.integrate.columns import side_by_side
+from potto.integrate.decomposition.effective_range import Ranges
 from potto.integrate.decomposition.meetings import SEARCHED, Row, as_array, tangents
 from potto.integrate.decomposition.root_isolation import between, flat
 from potto.integrate.events import Unsearched
@@ -40,14 +41,19 @@ POLISH, STUCK = 12, 0.9  # steps at most; the part of each of its sides that the
 BEYOND = 0.125  # how far beyond its range a turning place is looked for, which the map of nodes takes care of
 
 
-def critical_rows(level: LevelPlan, env: dict[str, Value], lo: Cell, hi: Cell, batch: int, machine: Any) -> list[Row]:
-    """The cuts of one variable at places where what lies further in meets, appears, merges or turns."""
+def critical_rows(
+    level: LevelPlan, env: dict[str, Value], lo: Cell, hi: Cell, near: Ranges, batch: int, machine: Any
+) -> list[Row]:
+    """The cuts of one variable at places where what lies further in meets, appears, merges or turns.
+
+    near: of variables whose range is infinite, what matters of it.
+    """
     low, high = as_array(np.minimum(lo.v, hi.v), batch), as_array(np.maximum(lo.v, hi.v), batch)
     around = BEYOND * np.where(np.isfinite(high - low), high - low, 0.0)
     rows: list[Row] = []
     for system in level.level.critical:
         beyond = around if system.turning else 0.0
-        found = _places(system, level.variable, env, low - beyond, high + beyond, machine)
+        found = _places(system, level.variable, env, low - beyond, high + beyond, near, machine)
         if found is None:
             machine.note(Unsearched(level.variable))
             continue
@@ -83,7 +89,7 @@ def _speeds(
 
 
 def _places(
-    system: Critical, variable: str, env: dict[str, Value], low: Array, high: Array, machine: Any
+    system: Critical, variable: str, env: dict[str, Value], low: Array, high: Array, near: Ranges, machine: Any
 ) -> tuple[Ints, Array, Array] | None:
     """Whose the solutions are, where (n, P), and how far off along what is cut; None if not all are known."""
     slopes = slopes_of(system, variable)
@@ -101,7 +107,7 @@ def _places(
         if not isinstance(value, Cell):
             return None
         fixed[name] = as_array(value.v, low.size)
-    search = _Search(names, fixed, terms[:n], terms[n : n + n * n], terms[n + n * n :])
+    search = _Search(names, fixed, terms[:n], terms[n : n + n * n], terms[n + n * n :], near)
     return search.solved(low, high, machine.search)
 
 
@@ -117,6 +123,7 @@ class _Search(Struct):
     equations: Sequence[Term]
     slopes: Sequence[Term]
     ends: Sequence[Term]
+    near: Ranges
     found: list[tuple[Ints, Array, Array]] = []
 
     def solved(self, low: Array, high: Array, within: Callable[[int], bool]) -> tuple[Ints, Array, Array] | None:
@@ -178,7 +185,9 @@ class _Search(Struct):
             # an infinite bound has no enclosure, as nothing has that is infinite all over
             least, most = ([np.where(np.isnan(end), far, end) for end in side]
                            for side, far in zip(zip(*both, strict=True), (-np.inf, np.inf), strict=True))  # fmt: skip
-            ends = np.broadcast_to(np.minimum(*least), low.shape), np.broadcast_to(np.maximum(*most), low.shape)
+            near = self.near.get(self.names[i], (-np.inf, np.inf))
+            ends = np.maximum(np.minimum(*least), near[0]), np.minimum(np.maximum(*most), near[1])
+            ends = np.broadcast_to(ends[0], low.shape), np.broadcast_to(ends[1], low.shape)
             box[self.names[i]] = rows[self.names[i]] = ends
             there = there & (ends[0] < ends[1])
         owner = np.nonzero(there)[0]

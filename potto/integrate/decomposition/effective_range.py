@@ -1,16 +1,18 @@
 """How much of an infinite range an integrand takes up: a density leaves next to nothing beyond some place.
 
-Owns `concentrated`, `pulled_in` and `reaches`. What the integrand is at most, on shells that grow around where it is
+Owns `pulled_in` and `reaches`. What the integrand is at most, on shells that grow around where it is
 concentrated, follows from its enclosure; where what all the shells farther out can hold is below rounding, nothing
 needs to be looked for, nor evaluated.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
+from potto.calculus.decomposition.sweep import Level
 from potto.core.terms import Var, postorder
 from potto.integrate.decomposition.meetings import as_array
 from potto.integrate.pieces import gather
@@ -21,26 +23,13 @@ from potto.integrate.rules.substitution import Segments, choose
 from potto.kernels.cells import Array, Cell, Ints, Value
 
 # Of shells, before one of them is looked at more closely; far out as large as rounding lets `k*log(x) - x` be told from
-# 0. Of infinity itself that says nothing, so that the last one ends where numbers nearly do.
-SIZES = np.concatenate((4.0 ** np.arange(-22, 23), 2.0 ** np.arange(84, 964, 40)))
+# 0, and `-x^2 - y^4` from what rounding makes of its larger end. Of infinity itself that says nothing, so that the last
+# one ends where numbers nearly do.
+SIZES = np.concatenate((4.0 ** np.arange(-22, 23), 2.0 ** np.arange(56, 964, 12)))
 FARTHEST = 2.0**964
 PARTS = 32  # into which that is divided
 NOTHING = EPS * EPS  # of what a shell holds at most
-
-
-def concentrated(
-    plan: Plan, number: int, env: dict[str, Value], lo: Cell, hi: Cell, batch: int
-) -> tuple[Cell, Cell, Array] | None:
-    """Bounds of variable `number` beyond which the integrand holds next to nothing, and how much at most: (B,).
-
-    None where the range is finite, or no such bounds are known.
-    """
-    low, high = as_array(np.minimum(lo.v, hi.v), batch), as_array(np.maximum(lo.v, hi.v), batch)
-    if np.isfinite(low).all() and np.isfinite(high).all():
-        return None
-    box = _box(plan, env, batch)
-    low, high, lost = _Range(plan, number, box, low, high).found(_volume(plan, number, box, batch))
-    return (Cell(low), Cell(high), lost) if np.isfinite(low).all() and np.isfinite(high).all() else None
+Ranges = dict[str, tuple[Array, Array]]
 
 
 def pulled_in(plan: Plan, number: int, env: dict[str, Value], seg: Segments, batch: int) -> Array | None:
@@ -72,19 +61,29 @@ def pulled_in(plan: Plan, number: int, env: dict[str, Value], seg: Segments, bat
     return left_out
 
 
-def reaches(plan: Plan, env: dict[str, Value]) -> tuple[dict[str, tuple[float, float]], float]:
-    """By variable of one integral whose range is infinite, a range beyond which there is next to nothing wherever the
-    variables further out are, infinite where none is known; and how much there is, at most."""
-    box = _box(plan, env, 1)
-    found: dict[str, tuple[float, float]] = {}
-    left_out = 0.0
-    for number, level in enumerate(own.level for own in plan.levels):
-        below, above = enclosure((level.lo, level.hi), box)
-        low, high = np.fmin(below[0], above[0]).reshape(1), np.fmax(below[1], above[1]).reshape(1)
+def reaches(
+    plan: Plan,
+    env: dict[str, Value],
+    numbers: Sequence[int],
+    ends: tuple[Array, Array] | None = None,
+    batch: int = 1,
+) -> tuple[Ranges, Array]:
+    """By variable whose range is infinite, a range beyond which there is next to nothing wherever the variables further
+    out are, infinite where none is known; and how much there is beyond them, at most: (B,).
+
+    numbers: of the variables, one after the other; ends: the bounds of the first one, lower ones first.
+    """
+    box = _box(plan, env, batch)
+    found: Ranges = {}
+    left_out = np.zeros(batch)
+    for number in numbers:
+        level = plan.levels[number].level
+        low, high = ends or _columns(_enclosed(level, box), batch)
+        ends = None
         if np.isinf(low).any() or np.isinf(high).any():
-            low, high, lost = _Range(plan, number, box, low, high).found(_volume(plan, number, box, 1))
-            left_out += float(lost[0])
-            found[level.variable] = float(low[0]), float(high[0])
+            low, high, lost = _Range(plan, number, box, low, high).found(_volume(plan, number, box, batch))
+            left_out += lost
+            found[level.variable] = low, high
         box[level.variable] = low[:, None], high[:, None]
     return found, left_out
 
@@ -113,11 +112,7 @@ def _volume(plan: Plan, number: int, box: dict[str, Interval], batch: int) -> Ar
     volume = np.ones(batch)
     for inner in range(number + 1, len(plan.levels)):
         level = plan.levels[inner].level
-        ends = enclosure((level.lo, level.hi), box)
-        below, above = (
-            as_array(np.broadcast_to(pick(ends[0][i], ends[1][i]), (batch, 1))[:, 0], batch)
-            for i, pick in ((0, np.fmin), (1, np.fmax))
-        )
+        below, above = _columns(_enclosed(level, box), batch)
         if not (np.isfinite(below).all() and np.isfinite(above).all()):
             found = _Range(plan, inner, box, below, above).found(np.ones(batch))
             below, above = as_array(found[0], batch), as_array(found[1], batch)
@@ -128,13 +123,21 @@ def _volume(plan: Plan, number: int, box: dict[str, Interval], batch: int) -> Ar
     return volume
 
 
+def _enclosed(level: Level, box: dict[str, Interval]) -> Interval:
+    """Between which ends a range lies. An infinite bound has no enclosure, and is taken as it is."""
+    (low, high), (least, most) = (
+        [np.where(np.isnan(end), far, end) for end in side]
+        for side, far in zip(enclosure((level.lo, level.hi), box), (-np.inf, np.inf), strict=True)
+    )
+    return np.minimum(low, least), np.maximum(high, most)
+
+
 def _stretches(plan: Plan, number: int, box: dict[str, Interval]) -> Array:
     """The size of the ranges of the variables further in, none of them infinite on shells of this one: (B, places)."""
     volume: Array = np.ones(())
     box = dict(box)
     for level in (each.level for each in plan.levels[number + 1 :]):
-        below, above = enclosure((level.lo, level.hi), box)
-        box[level.variable] = ends = np.fmin(below[0], above[0]), np.fmax(below[1], above[1])
+        box[level.variable] = ends = _enclosed(level, box)
         with np.errstate(invalid="ignore"):
             volume = volume * (ends[1] - ends[0])
     return np.where(np.isnan(volume), np.inf, volume)
@@ -172,7 +175,7 @@ class _Range:
         return np.where(np.isfinite(other), pick(start, other), start)
 
     def end(self, side: float, start: Array, volume: Array) -> tuple[Array, Array]:
-        """The nearest place beyond which there is next to nothing, inf if there is none, and how much there is."""
+        """The nearest place beyond which there is next to nothing, infinite if there is none, and how much there is."""
         far = start[:, None] + side * np.concatenate(([0.0], SIZES, [FARTHEST]))
         held = self.held(side, far, volume)
         most = np.max(held, axis=1, initial=0.0, where=np.isfinite(held))
@@ -186,7 +189,7 @@ class _Range:
         fine = _parts(far[row, np.maximum(at - 1, 0)], far[row, at])
         within = self.held(side, fine, volume)
         part, left = _first(np.concatenate((within, left[:, None]), axis=1), NOTHING * most)
-        return np.where(known, fine[row, np.minimum(part, PARTS)], np.inf), left
+        return np.where(known, fine[row, np.minimum(part, PARTS)], side * np.inf), left
 
     def held(self, side: float, places: Array, volume: Array) -> Array:
         """What there is at most between one place and the next: (B, places - 1)."""
@@ -199,6 +202,11 @@ class _Range:
             within = np.minimum(within, _stretches(self.plan, self.number, box))
         with np.errstate(invalid="ignore"):
             return np.where(size == 0, 0.0, size * np.abs(ends[1] - ends[0]) * within)
+
+
+def _columns(ends: Interval, batch: int) -> tuple[Array, Array]:
+    low, high = (as_array(np.broadcast_to(end, (batch, 1))[:, 0], batch) for end in ends)
+    return low, high
 
 
 def _parts(start: Array, end: Array) -> Array:

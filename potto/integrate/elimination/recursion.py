@@ -215,7 +215,8 @@ def one_by_one(
 ) -> Sums | None:  # fmt: skip
     """The integral, each step from the table of the next; None where one can't be made, or it takes more evaluations
     than can be afforded. plan: of the integral as a whole, which tells how much of an infinite range matters."""
-    ranges, left_out = reaches(plan, env)
+    found, left_out = reaches(plan, env, range(len(plan.levels)))
+    ranges = {name: (float(low[0]), float(high[0])) for name, (low, high) in found.items()}
     settings, best, least = machine.settings, None, math.inf
     most = min(settings.max_evals, int(machine.record.spent) + affordable)
     for share in SHARES:

@@ -13,7 +13,7 @@ from msgspec import Struct
 
 from potto.integrate.columns import distinct
 from potto.integrate.decomposition.cuts import NARROW, ONE_PLACE
-from potto.integrate.events import BUDGET_SPENT, TwoSided
+from potto.integrate.events import BUDGET_SPENT, TwoSided, Unsearched
 from potto.integrate.levels import LevelPlan
 from potto.integrate.panels.iterated import Iterated
 from potto.integrate.panels.mending import mend
@@ -72,8 +72,9 @@ class PanelBatch(Struct, dict=True):
         with np.errstate(divide="ignore", invalid="ignore"):
             off = np.maximum(self.seg.ea, self.seg.eb) / (self.seg.b - self.seg.a)
         self.hinted = any(level.peaks for level in self.parent.plan.levels[self.number :])
-        # Whether places are not known at which sections further in cross.
-        self.blind = not all(level.level.complete for level in self.parent.plan.levels[self.number + 1 :])
+        # Whether places are not known at which sections further in cross, appear or turn.
+        unsearched = any(event.variable == self.level.variable for event, _ in self.machine.events.every(Unsearched))
+        self.blind = unsearched or not all(own.level.complete for own in self.parent.plan.levels[self.number + 1 :])
         self.bends = not self.last and bool((off > UNSURE).any())  # beside cuts, by more than nothing
 
     # Channels: per component the value, then per direction the moving form, then (if both) the fixed form
