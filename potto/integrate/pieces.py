@@ -1,6 +1,6 @@
 """What passes between the parts of the integrator: sums over a batch, pieces under refinement, environments.
 
-Owns `Sums`, `Pieces` and `Evaluator`, the integrator's view of the machine.
+Owns `Sums`, `Shaped`, `Pieces` and `Evaluator`, the integrator's view of the machine.
 """
 
 from __future__ import annotations
@@ -158,6 +158,15 @@ class Crossing(Struct, frozen=True):
         """Tangents and their errors with what crosses, by nodes that move, or not."""
         value, bound = tangents[0] + self.t, tangents[1] + self.et
         return (value - self.counted, bound + self.uncertain) if moving else (value, bound)
+
+
+class Shaped(Struct, frozen=True):
+    """Which members of a batch are done (B,), for which rounding alone leaves less than was asked for (B,), and the
+    sums of both, zero for all others."""
+
+    done: Bools
+    short: Bools
+    sums: Sums
 
 
 class Pieces(Columns):

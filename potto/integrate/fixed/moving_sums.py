@@ -1,9 +1,9 @@
 """Sums over the nodes of cells whose ends are formulas: values and tangents, with the rounding of both.
 
-Owns `summed`, `product`, `MovingTotals` and `evaluated`. Nodes move with the ends of their cells, so that the tangent
-of the sum is the derivative of the integral. Blocks of numbers have values in row 0 and tangents in rows 1 ... k of
-their first axis; the nodes of the variables, (P, n2, n3), are their last axes: P those of the outermost variable, cell
-after cell.
+Owns `summed`, `product`, `any_moves`, `MovingTotals` and `evaluated`. Nodes move with the ends of their cells, so that
+the tangent of the sum is the derivative of the integral. Blocks of numbers have values in row 0 and tangents in rows
+1 ... k of their first axis; the nodes of the variables, (P, n2, n3), are their last axes: P those of the outermost
+variable, cell after cell.
 """
 
 from __future__ import annotations
@@ -109,7 +109,7 @@ def summed(
         lo, width, off = _between(ends)
         for name in variables[:i]:
             here[name] = here[name].map(_deeper)  # type: ignore[union-attr]
-        moves = [_moves(frame, d) for d in range(k)]
+        moves = [any_moves(frame, d) for d in range(k)]
         here[variable] = placed = _placed(lo, width, off, layout.nodes[i], i > 0, moves)
         if not i:
             length, rounded = width, off
@@ -124,7 +124,7 @@ def summed(
     return _added(values, length * layout.weights, rounded * layout.weights, layout.count)
 
 
-def _moves(frame: Sequence[Cell], d: int) -> bool:
+def any_moves(frame: Sequence[Cell], d: int) -> bool:
     """Whether any of the cells moves along a direction."""
     for cell in frame:  # noqa: SIM110 - runs with every call: no generator
         if cell.t[d] is not None:

@@ -1,6 +1,6 @@
 """How many nodes are enough, proved before any is evaluated.
 
-Owns `FrameCell`, `Region`, `Orders`, `proved` and `proved_of_each`.
+Owns `FrameCell`, `Region`, `Orders`, `proved`, `proved_of_each` and `error_bounds`.
 
 On a cell between known cuts the integrand is one formula, analytic wherever `discs` can bound it. If |f| <= M on the
 ellipse with foci -1, 1 and half-axes adding up to rho, the Gauss rule with n nodes errs, relative to the length of its
@@ -31,7 +31,7 @@ from potto.core.terms import Term
 from potto.integrate.rules.complex_enclosures import Form, enclosed
 from potto.kernels.cells import Array, Bools, Ints
 
-MOST_NODES = 16
+LEAST_NODES, MOST_NODES = 2, 16
 # Radii of the discs that are tried, in half-lengths of the cell; the last three are for polynomials.
 RADII = (1.25, 1.5, 1.8, 2.2, 2.6, 3.0, 3.4, 3.8, 4.4, 5.0, 6.0, 8.0, 12.0, 20.0, 1e3, 1e8, 1e16)
 # Into how many boxes the real interval of each of the other variables is cut, by the number of variables.
@@ -90,7 +90,7 @@ def _probes(count: int) -> tuple[Array, Array, Array]:
                 centres.append(centre)
                 reach.append(wide)
     radii = np.array(RADII)
-    rho, n = radii + np.sqrt(radii * radii - 1), np.arange(2, MOST_NODES + 1)[:, None]
+    rho, n = radii + np.sqrt(radii * radii - 1), np.arange(LEAST_NODES, MOST_NODES + 1)[:, None]
     powers = np.maximum(SURE * 32 / 15 * rho ** (-2.0 * n) / (1 - rho**-2.0), 1e-300)
     return np.array(centres).T.copy(), np.array(reach).T.copy(), powers
 
@@ -104,7 +104,7 @@ def proved(
     middle, radius: of the region of each parameter; the proof holds on discs of twice the radius.
     """
     count, places = len(variables), {name: np.array([x]) for name, x in middle.items()}
-    bounds, sizes = zip(*(_bounds(variables, frames, cell, places, radius) for cell in cells), strict=True)
+    bounds, sizes = zip(*(error_bounds(variables, frames, cell, places, radius) for cell in cells), strict=True)
     errors = np.array(bounds)[..., 0]
     share = tolerance * abs(float(sum(size[0] for size in sizes))) / (count * len(cells))
     enough: Bools = np.all(errors <= share, axis=0)
@@ -113,7 +113,8 @@ def proved(
         return None
     outer, inner = (errors[:, 0] <= share).argmax(axis=1), enough[1:].argmax(axis=1)
     bound = sum(float(e[0, o] + e[np.arange(1, count), inner].sum()) for e, o in zip(errors, outer, strict=True))
-    return Region(tuple(cells), tuple(int(o) + 2 for o in outer), tuple(int(i) + 2 for i in inner), bound, dict(radius))
+    nodes, others = (tuple(int(number) + LEAST_NODES for number in numbers) for numbers in (outer, inner))
+    return Region(tuple(cells), nodes, others, bound, dict(radius))
 
 
 def proved_of_each(
@@ -124,26 +125,26 @@ def proved_of_each(
 
     exact: the nodes of those variables for which it is known that they leave nothing out.
     """
-    errors, size = _bounds(variables, frames, cell, middle, radius)
+    errors, size = error_bounds(variables, frames, cell, middle, radius)
     free = np.array([n is None for n in exact])
     errors[~free] = 0.0
     enough = errors <= tolerance * np.abs(size) / max(1, int(free.sum()))
     number = enough.argmax(axis=1)
     error = np.take_along_axis(errors, number[:, None], 1)[:, 0].sum(axis=0)
-    nodes = np.array([number[i] + 2 if n is None else np.full(size.size, n) for i, n in enumerate(exact)])
+    nodes = np.array([number[i] + LEAST_NODES if n is None else np.full(size.size, n) for i, n in enumerate(exact)])
     return Orders(np.where(enough.any(axis=1).all(axis=0), nodes, 0).T, error)
 
 
-def _bounds(
+def error_bounds(
     variables: Sequence[str], frames: Sequence[Sequence[Term]], cell: FrameCell, middle: Mapping[str, Array],
-    radius: Mapping[str, float],
+    radius: Mapping[str, float] | Mapping[str, Array],
 ) -> tuple[Array, Array]:  # fmt: skip
     """Of a cell in R regions: bounds of the error of rules along each variable, (D, orders, R), and what the integral
-    is about, (R,)."""
+    is about, (R,). Orders begin with LEAST_NODES. radius: the same in all regions, or of each (R,)."""
     count, names = len(variables), sorted(middle)
     centres, reach, powers = _probes(count)
-    own = np.outer([2.0 * radius[name] for name in names], np.ones(reach.shape[1]))
-    h = np.concatenate((reach, own))[:, None]
+    own = np.broadcast_arrays(np.zeros(1), *[2.0 * np.atleast_1d(radius[name]) for name in names])[1:]
+    h = np.stack(np.broadcast_arrays(*[row[None] for row in reach], *[row[:, None] for row in own]))
     unit = np.eye(count + len(names))[:, :, None, None]
     start = {name: Form(middle[name][:, None], unit[i], 0.0, h) for i, name in enumerate(names, count)}
     form = _on_cell(variables, frames, cell, start, unit, centres, h)

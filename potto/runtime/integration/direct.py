@@ -37,6 +37,7 @@ from potto.diagnostics import PottoError
 from potto.integrate.fixed.moving_sums import MovingTotals
 from potto.integrate.fixed.proved_sums.a_priori import proved_sum, settled
 from potto.integrate.fixed.proved_sums.settled import SettledRegion
+from potto.integrate.fixed.steps.step_sums import SteppedCall
 from potto.integrate.fixed.straight import StraightIntegral
 from potto.kernels.cells import Cell, Value, map_arrays, pad
 from potto.kernels.making import making
@@ -179,7 +180,7 @@ class SettledCall(Struct, frozen=True):
     """An integral all about which is settled near the arguments of a call. fixed, given: its parameters that are
     numbers, and those that are arguments."""
 
-    integral: SettledRegion
+    integral: SettledRegion | SteppedCall
     fixed: Mapping[str, Value]
     given: tuple[tuple[str, str], ...]
 

@@ -1,6 +1,6 @@
 """Members of a batch whose cells are alike, by one product rule for all cells of a shape.
 
-Owns `by_shapes` and `Shaped`. What `a_priori` does for one member, with orders that are proved, is done here for many
+Owns `by_shapes`. What `a_priori` does for one member, with orders that are proved, is done here for many
 at once, with orders that are proved for regions of parameters (`proved_shapes`), or that the Legendre coefficients at
 the nodes show to be enough. Nodes move with the ends of their cells (Reynolds' transport theorem), so that the
 tangents of the sums are the derivatives and no boundary term is left. Rounding is kept track of, as everywhere outside
@@ -14,14 +14,14 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from msgspec import Struct
 
 from potto.integrate.fixed.cells.product_rule import CANCELS, FEW, ProductRule
 from potto.integrate.fixed.cells.proved_shapes import proved_rules
 from potto.integrate.fixed.cells.topologies import Alike, topologies
 from potto.integrate.fixed.moving_sums import evaluated
+from potto.integrate.fixed.steps.step_batches import by_cells
 from potto.integrate.fixed.straight import StraightIntegral
-from potto.integrate.pieces import Evaluator, Sums, added_up, gather, together
+from potto.integrate.pieces import Evaluator, Shaped, Sums, added_up, gather, together
 from potto.kernels.cells import Array, Bools, Cell, Ints, Value
 
 # Nodes per variable that are tried, one after the other.
@@ -39,15 +39,6 @@ PROBE = 2
 ROUNDED = 1e-12
 
 
-class Shaped(Struct, frozen=True):
-    """Which members of a batch are done (B,), for which rounding alone leaves less than was asked for (B,), and the
-    sums of both, zero for all others."""
-
-    done: Bools
-    short: Bools
-    sums: Sums
-
-
 def by_shapes(
     plan: StraightIntegral, degrees: Sequence[int | None], machine: Evaluator, env: dict[str, Value], batch: int,
     tight: bool,
@@ -58,6 +49,12 @@ def by_shapes(
     """
     if machine.frozen or machine.side or not all(isinstance(env.get(name), Cell) for name in plan.names):
         return None
+    if plan.steps is not None and machine.costs is None:
+        degree = (plan.steps.degree,)
+        return by_cells(
+            plan.steps, machine, env, batch,
+            lambda cell, parts, count: by_shapes(cell, degree, machine, parts, count, tight),
+        )  # fmt: skip
     if plan.choices is None:
         return _of_one_form(plan, degrees, machine, env, batch, tight)
     (done, short), sums = np.zeros((2, batch), dtype=bool), Sums.zeros(1, machine.directions, batch)

@@ -25,6 +25,7 @@ from potto.integrate.fixed.proved_sums.on_bounds import OnBounds, Place, Tied
 from potto.integrate.fixed.proved_sums.settled import SettledRegion, accurate
 from potto.integrate.fixed.proved_sums.sum_text import RepeatedSum
 from potto.integrate.fixed.regions import LOOSEST, Path, Places, known, region_of, settle
+from potto.integrate.fixed.steps.step_sums import SteppedCall
 from potto.integrate.fixed.straight import CLEAR, StraightIntegral, nothing
 from potto.integrate.pieces import Evaluator, Sums
 from potto.integrate.rules.proved_orders import FrameCell as Stretch
@@ -238,9 +239,12 @@ def _summed(plan: StraightIntegral, machine: Evaluator, env: dict[str, Value]) -
     plan, values = _decided(plan, machine, env)
     if values is None or machine.frozen or machine.side:
         return None
+    certain = machine.costs is None and _exact(plan, env)
+    if certain and plan.steps is not None and (stepped := SteppedCall(plan.steps, machine.tracking()).at(env)):
+        machine.count(stepped.nodes)
+        return stepped
     frame = evaluated(plan.frames[0], machine.tracking(), env)
     reach, rtol = float(frame[1].v - frame[0].v), min(machine.rtol, LOOSEST)
-    certain = machine.costs is None and all(env[name].e is None for name in plan.names)  # type: ignore[union-attr]
     region = found.region if certain and (found := known(plan, values, reach, rtol)) else None
     if region is None:
         cells, shortest = _cells(plan, machine, env, frame)
@@ -262,14 +266,18 @@ def _summed(plan: StraightIntegral, machine: Evaluator, env: dict[str, Value]) -
 
 
 @np.errstate(all="ignore")
-def settled(plan: StraightIntegral, machine: Evaluator, env: dict[str, Value]) -> SettledRegion | None:
+def settled(plan: StraightIntegral, machine: Evaluator, env: dict[str, Value]) -> SettledRegion | SteppedCall | None:
     """What is known of the integral for all parameters near these; None where that is not settled, or not yet."""
     plan, values = _decided(plan, machine, env)
     if values is None or machine.frozen or machine.side or machine.costs is not None:
         return None
+    if not _exact(plan, env):
+        return None
+    if plan.steps is not None:
+        return SteppedCall(plan.steps, machine.tracking())
     low, high, *_ = evaluated(plan.frames[0], machine.tracking(), env)
     found = known(plan, values, float(high.v - low.v), min(machine.rtol, LOOSEST))
-    if found is None or any(env[name].e is not None for name in plan.names):  # type: ignore[union-attr]
+    if found is None:
         return None
     region = found.region
     faces = machine_code(plan, region, machine, env)
@@ -304,6 +312,11 @@ def _numbers(plan: StraightIntegral, env: Mapping[str, Value]) -> dict[str, floa
             return None
         values[name] = float(cell.v)
     return values
+
+
+def _exact(plan: StraightIntegral, env: Mapping[str, Any]) -> bool:
+    """Whether nothing puts the parameters off."""
+    return all(env[name].e is None for name in plan.names)
 
 
 def _truncation(plan: StraightIntegral, region: Region, directions: int, env: Mapping[str, Any]) -> list[float]:

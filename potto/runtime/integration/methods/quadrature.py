@@ -10,18 +10,15 @@ from collections.abc import Iterable
 from contextlib import AbstractContextManager
 from functools import lru_cache
 from itertools import chain
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from potto.integrate.pieces import Sums, gather
+from potto.integrate.pieces import Shaped, Sums, gather
 from potto.integrate.plan import Plan
 from potto.kernels.cells import Bools, Ints, Value
 from potto.runtime.answers.convergence import rounded
 from potto.runtime.evaluation.machine import Machine
-
-if TYPE_CHECKING:
-    from potto.integrate.fixed.cells.alike import Shaped
 
 START_ORDER = 11
 ORDERS = (4, 6, 10, 14, 18)

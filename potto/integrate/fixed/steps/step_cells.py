@@ -1,0 +1,177 @@
+"""The cells between the cuts of a `StepIntegral`, and how high its step functions are on them.
+
+Owns `StepCells` and `step_cells`. The cuts are put in order once; all else follows from that order: ends of cells are
+neighbours in it, heights are sums along it. That it is sure is seen by comparing neighbours. Cuts that rounding does
+not tell apart, or one from a bound, are left to others.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from msgspec import Struct
+
+from potto.core.terms import Const, children
+from potto.integrate.fixed.moving_sums import any_moves, evaluated
+from potto.integrate.fixed.steps.step_integral import StepIntegral
+from potto.integrate.fixed.straight import CLEAR
+from potto.integrate.pieces import Evaluator
+from potto.integrate.rules.gauss import EPS
+from potto.kernels.cells import Array, Bools, Cell, Ints, Value
+
+# What the sums along the cuts are in, and what that rounds off.
+WIDE = np.longdouble
+WIDE_EPS = float(np.finfo(WIDE).eps)
+WHOLE = 2.0**53  # below which sums of whole numbers are exact
+Height = tuple[Array, Array | None]
+
+
+class StepCells(Struct, frozen=True):
+    """The cells of one member, or of B, as many for each: behind the last one of a member come some of the width 0.
+
+    low, width, off: (1 + k, [B,] C), with tangents: lower ends, widths, and how far both ends may be off. heights: of
+    each step function its numbers on the cells and their errors, of that shape too, or (1, [B,] C) without tangents;
+    None for errors of 0. moving: the directions in which ends move. fine: for whom all this is sure. inside: how many
+    are cells.
+    """
+
+    low: Array
+    width: Array
+    off: Array
+    heights: tuple[Height, ...]
+    moving: tuple[bool, ...]
+    fine: Bools
+    inside: Ints
+
+    def pick(self, cells: Any) -> StepCells:
+        """Those at some places of the last axis, or of the last two."""
+        low, width, off = (block[..., *cells] for block in (self.low, self.width, self.off))
+        heights = tuple([(x[..., *cells], None if e is None else e[..., *cells]) for x, e in self.heights])
+        return StepCells(low, width, off, heights, self.moving, self.fine, self.inside)
+
+    def levels(self) -> list[Cell]:
+        """The step functions."""
+        return [_cell(number, error, len(self.moving)) for number, error in self.heights]
+
+
+def step_cells(plan: StepIntegral, machine: Evaluator, env: dict[str, Value], batch: int | None = None) -> StepCells:
+    """The cells of one member, or of a batch. machine: one that keeps track of rounding."""
+    k, shape = machine.directions, () if batch is None else (batch,)
+    frame = evaluated(plan.frame, machine, {name: env[name] for name in plan.frame.params})
+    places, errors = _rows(frame, k, shape)
+    rows, count = _in_order(places[0], errors[0])
+    ends, slack = _along(places, rows), _along(errors, rows)
+    width, doubt = ends[..., 1:] - ends[..., :-1], slack[..., 1:] + slack[..., :-1]
+    fine = _apart(width[0], doubt[0], count)
+    below = places[0] < places[0, ..., :1]
+    heights = tuple([
+        _height(*(_numbers(plan, own) or _rows(levels, k, shape)), plan.steps[own], rows, below)
+        for own, levels in enumerate(_levels(plan, machine, env))
+    ])  # fmt: skip
+    moving = tuple([any_moves(frame, d) for d in range(k)])
+    return StepCells(
+        ends[..., :-1], width, doubt + EPS * (np.abs(ends[..., 1:]) + np.abs(ends[..., :-1])), heights,
+        moving, fine, count - 1,
+    )  # fmt: skip
+
+
+def _levels(plan: StepIntegral, machine: Evaluator, env: dict[str, Value]) -> list[tuple[Cell, ...]]:
+    """The heights of each step function."""
+    if all(plan.resting):
+        return [()] * len(plan.steps)
+    levels = evaluated(plan.heights, machine, {name: env[name] for name in plan.heights.params})
+    ends = _ends(plan)
+    return [levels[start:stop] for start, stop in itertools.pairwise(ends)]
+
+
+def _ends(plan: StepIntegral) -> list[int]:
+    """Where the heights of each step function begin and end."""
+    return list(itertools.accumulate([1 + 2 * len(own) for own in plan.steps], initial=0))
+
+
+@lru_cache(maxsize=512)
+def _numbers(plan: StepIntegral, own: int) -> tuple[Array, Array] | None:
+    """The heights of a step function as numbers that have no error and do not move, (1, R) each; None where they are
+    no such."""
+    if not plan.resting[own]:
+        return None
+    levels = children(plan.heights.body)[slice(*_ends(plan)[own : own + 2])]
+    numbers = np.array([[level.value for level in levels if isinstance(level, Const)]])
+    return numbers, np.zeros(numbers.shape)
+
+
+def _rows(cells: Sequence[Cell], k: int, shape: tuple[int, ...]) -> tuple[Array, Array]:
+    """Cells and their errors with tangents as rows, (1 + k, [B,] R) each."""
+    if not shape:
+        none = (None,) * k
+        columns = ([(c.v, *(c.t or none)) for c in cells], [(c.e, *(c.et or none)) for c in cells])
+        found = np.array([[[row[d] or 0.0 for row in rows] for d in range(1 + k)] for rows in columns])
+        return found[0], found[1]
+    out = np.zeros((2, 1 + k, len(cells), *shape))
+    for row, cell in enumerate(cells):
+        for part, numbers in enumerate(((cell.v, *cell.t), (cell.e, *cell.et))):
+            for d, number in enumerate(numbers):
+                if number is not None:
+                    out[part, d, row] = number
+    both = np.ascontiguousarray(out.swapaxes(-1, -2))
+    return both[0], both[1]
+
+
+def _in_order(places: Array, errors: Array) -> tuple[Ints, Ints]:
+    """The rows from one bound to the other in order, ([B,] R), the upper bound again and again where cuts lie beyond
+    these; how many there are, ([B])."""
+    near = CLEAR * errors
+    away = places < places[..., :1] - near[..., :1] - near
+    away |= places > places[..., 1:2] + near[..., 1:2] + near
+    key = np.where(away, np.inf, places)
+    key[..., 0], key[..., 1] = -np.inf, np.finfo(float).max  # what lies next to a bound counts as within
+    order, beyond = key.argsort(axis=-1), away[..., 2:].sum(axis=-1)
+    count = order.shape[-1] - beyond
+    if beyond.any():
+        order = np.where(np.arange(order.shape[-1]) < count[..., None], order, 1)
+    return order, count
+
+
+def _apart(width: Array, doubt: Array, count: Ints) -> Bools:
+    """For whom bounds and cuts, so many as there are, are clear of each other; what is not finite is not."""
+    apart = width > CLEAR * doubt
+    if (count <= width.shape[-1]).any():
+        apart |= np.arange(1, 1 + width.shape[-1]) >= count[..., None]
+    return np.asarray(apart.all(axis=-1) & np.isfinite(width.sum(axis=-1) + doubt.sum(axis=-1)))
+
+
+def _along(block: Array, rows: Ints) -> Array:
+    """Rows of a block (1 + k, [B,] R) in an order ([B,] C)."""
+    return block.take(rows, axis=-1) if rows.ndim == 1 else np.take_along_axis(block, rows[None], -1)
+
+
+def _height(numbers: Array, errors: Array, cuts: Sequence[int], rows: Ints, below: Bools) -> Height:
+    """A step function on the cells, and how far that is off, with tangents if it has any: its height below all cuts,
+    and what it changes at those that are passed, further and further up. below: the rows below the lower bound."""
+    most = np.abs(numbers).sum(axis=-1, keepdims=True)
+    exact = not errors.any() and bool((numbers == np.rint(numbers)).all()) and most.max() < WHOLE
+    changes = np.zeros((len(numbers), *below.shape), dtype=float if exact else WIDE)
+    level = 1 + len(cuts)
+    changes[..., list(cuts)] = numbers[..., level:]
+    terms = _along(changes, rows[..., :-1])
+    terms[..., 0] = (changes * below).sum(axis=-1) + numbers[..., :level].sum(axis=-1, dtype=changes.dtype)
+    found = np.cumsum(terms, axis=-1)
+    if exact:
+        return found, None
+    found = found.astype(float)
+    return found, EPS * np.abs(found) + 3 * below.shape[-1] * WIDE_EPS * most + errors.sum(axis=-1, keepdims=True)
+
+
+def _cell(number: Array, error: Array | None, k: int) -> Cell:
+    """Numbers (1 + k, ...), or (1, ...), and their errors; tangents that are 0 everywhere are None."""
+    e = None if error is None else error[0]
+    if len(number) == 1:
+        return Cell(number[0], e, (None,) * k)
+    t = tuple([row if row.any() else None for row in number[1:]])
+    if error is None:
+        return Cell(number[0], None, t)
+    return Cell(number[0], e, t, tuple([None if x is None else off for x, off in zip(t, error[1:], strict=True)]))

@@ -1,0 +1,177 @@
+"""Conditions in one variable that count through step functions: values, derivatives and bounds against closed forms.
+
+Truths are sums over the stretches between the cuts in 40 digits: the conditions are decided at the middle of each by
+comparing numbers, not by anything of Potto's.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Sequence
+
+import mpmath
+import numpy as np
+import pytest
+from call_counts import calls_in
+
+import potto
+
+DIGITS = 40
+STEP = 2.3
+RNG = np.random.default_rng(7)
+Number = mpmath.mpf
+
+
+def truth(
+    primitive: Callable[[Number, Sequence[bool]], Number], cuts: Sequence[float], low: float = 0.0, high: float = 1.0
+) -> tuple[Number, list[Number]]:
+    """The integral from low to high of a function of x and of which of `x < cut` hold, and its derivatives by the cuts,
+    by its primitive and what it jumps by: the sums of `primitive` over the ends of the stretches."""
+    with mpmath.workdps(DIGITS):
+        ends = sorted({low, high, *(a for a in cuts if low < a < high)})
+        total = Number(0)
+        for a, b in itertools.pairwise(ends):
+            sides = [(a + b) / 2 < cut for cut in cuts]
+            total += primitive(Number(b), sides) - primitive(Number(a), sides)
+        slopes = []
+        for number, cut in enumerate(cuts):
+            if not low < cut < high:
+                slopes.append(Number(0))
+                continue
+            sides = [cut < other for other in cuts]
+            left, right = ([*sides[:number], inside, *sides[number + 1 :]] for inside in (True, False))
+            jump = (mpmath.diff(lambda x, s=s: primitive(x, s), Number(cut)) for s in (left, right))
+            slopes.append(next(jump) - next(jump))
+        return total, slopes
+
+
+def checked(answer: potto.Estimate, value: Number, slopes: Sequence[Number], digits: float = 1e-13) -> None:
+    """Within `digits` of the largest number, and within the bounds that the answer gives for itself."""
+    assert answer.converged
+    found = [answer.value, *np.atleast_1d(answer.tangent)]
+    errors = [answer.error, *np.atleast_1d(answer.tangent_error)]
+    exact = [value, *slopes]
+    size = max(map(abs, exact))
+    for x, error, true in zip(found, errors, exact, strict=True):
+        assert abs(x - true) <= max(error, 2.0**-52 * abs(true))
+        assert abs(x - true) <= digits * size
+
+
+def parameters(n: int) -> list[str]:
+    return [f"a{k}" for k in range(n)]
+
+
+@pytest.mark.parametrize("n", [5, 12, 13, 40, 200])
+def test_a_function_of_how_many_conditions_hold(n: int) -> None:
+    names, at = parameters(n), RNG.uniform(-0.2, 1.2, n).tolist()
+    terms = " + ".join(f"[x < {name}]" for name in names)
+    f = potto.compile(f"def f({', '.join(names)}) integral [0, 1] 1/(1 + {terms}) d(x)").f
+    checked(potto.grad(f, names)(*at), *truth(lambda x, sides: x / (1 + sum(sides)), at))
+
+
+@pytest.mark.parametrize("n", [5, 12, 13, 40, 200])
+def test_beside_what_is_no_polynomial(n: int) -> None:
+    """Coefficients are no whole numbers, and parameters: sums along the cuts are rounded, and move."""
+    names, at, t, c = parameters(n), RNG.uniform(-0.2, 1.2, n).tolist(), 0.7, 0.3
+    terms = " + ".join(f"{1 + k / 10}*c*[x < {name}]" for k, name in enumerate(names))
+    f = potto.compile(f"def f(t, c, {', '.join(names)}) integral [0, 1] exp(x*t)*(1 + {terms}) d(x)").f
+    with mpmath.workdps(DIGITS):
+
+        def height(sides: Sequence[bool], c: float) -> Number:
+            return 1 + sum(Number(1 + k / 10) * c * inside for k, inside in enumerate(sides))
+
+        value, slopes = truth(lambda x, s: height(s, c) * mpmath.exp(x * t) / t, at)
+        by_t, _ = truth(lambda x, s: height(s, c) * mpmath.exp(x * t) * (x / t - 1 / Number(t) ** 2), at)
+        by_c = (value - truth(lambda x, s: mpmath.exp(x * t) / t, at)[0]) / c
+    checked(potto.grad(f, ["t", "c", *names])(t, c, *at), value, [by_t, by_c, *slopes])
+    batch = potto.grad(f, "t")(np.array([t, t / 2]), c, *at)
+    checked(potto.grad(f, "t")(t / 2, c, *at), batch.value[1], [batch.tangent[1]])
+    assert batch.value[0] == pytest.approx(float(value), rel=1e-13, abs=0)
+
+
+@pytest.mark.parametrize("written, primitive", [
+    ("x^2*({0})^2 - ({0})", lambda x, n: x**3 / 3 * n**2 - x * n),
+    ("({0})/(2 + x + ({0}))", lambda x, n: n * mpmath.log(2 + x + n)),
+    ("sin(x)*({0})*(3 - ({0})/10)", lambda x, n: -mpmath.cos(x) * n * (3 - Number(n) / 10)),
+    ("exp(-({0})/10)*cos(5*x)", lambda x, n: mpmath.exp(-Number(n) / 10) * mpmath.sin(5 * x) / 5),
+])  # fmt: skip
+def test_in_many_forms(written: str, primitive: Callable[[Number, int], Number]) -> None:
+    """Conditions either way round, strict or not, with other slopes, and as conditionals; bounds that are numbers."""
+    n = 20
+    names, at = parameters(n), RNG.uniform(-0.9, 1.9, n).tolist()
+    forms = ("[x < {}]", "(1 - [{} <= x])", "[2*x - {0} <= {0}]", "(if [x < {}] then 3 else 2) - 2")
+    terms = " + ".join(forms[k % len(forms)].format(name) for k, name in enumerate(names))
+    f = potto.compile(f"def f({', '.join(names)}) integral [-0.5, 1.5] {written.format(f'({terms})')} d(x)").f
+    checked(potto.grad(f, names)(*at), *truth(lambda x, sides: primitive(x, sum(sides)), at, -0.5, 1.5), 1e-12)
+
+
+def test_coefficients_that_are_no_whole_numbers() -> None:
+    """They stand still, and their sums are rounded."""
+    n, t = 20, 0.8
+    terms = " + ".join(f"{k / 10}*[x < {k / n}*t]" for k in range(1, n))
+    f = potto.compile(f"def f(t, c) integral [0, 1] cos(c*x)*({terms}) d(x)").f
+    with mpmath.workdps(DIGITS):
+        cuts = [(Number(k / 10), Number(k / n)) for k in range(1, n)]
+        value = mpmath.fsum(h * mpmath.sin(3 * s * t) / 3 for h, s in cuts)
+        by_t = mpmath.fsum(h * s * mpmath.cos(3 * s * t) for h, s in cuts)
+        by_c = mpmath.fsum(h * (s * t * mpmath.cos(3 * s * t) / 3 - mpmath.sin(3 * s * t) / 9) for h, s in cuts)
+    checked(potto.grad(f, ["t", "c"])(t, 3.0), value, [by_t, by_c])
+
+
+def test_where_nothing_is_integrated_nothing_is_asked_for() -> None:
+    """log(x - 1/2) has no value below 1/2, where no condition holds."""
+    n = 20
+    terms = " + ".join(f"[x > 0.6 + {k / 100}*t]" for k in range(n))
+    f = potto.deriv(potto.compile(f"def f(t) integral [0, 1] log(x - 0.5)*({terms}) d(x)").f)
+    with mpmath.workdps(DIGITS):
+        half, at = Number(1) / 2, [Number(0.6) + Number(k / 100) for k in range(n)]
+
+        def primitive(x: Number) -> Number:
+            return (x - half) * (mpmath.log(x - half) - 1)
+
+        value = mpmath.fsum(primitive(Number(1)) - primitive(a) for a in at)
+        slope = mpmath.fsum(-Number(k / 100) * mpmath.log(a - half) for k, a in enumerate(at))
+    checked(f((1.0, 1.0)), value, [slope])
+
+
+def test_cuts_that_are_one() -> None:
+    """Twice as many conditions as cuts: the general way tells what happens there."""
+    names = parameters(30)
+    terms = " + ".join(f"[x < {name}]" for name in names)
+    f = potto.compile(f"def f({', '.join(names)}) integral [0, 1] 1/(1 + {terms}) d(x)").f
+    at = np.repeat(RNG.uniform(0.1, 0.9, 15), 2).tolist()
+    found = f(*at)
+    value, _ = truth(lambda x, sides: x / (1 + sum(sides)), at)
+    assert abs(found.value - value) <= max(found.error, 1e-15)
+
+
+def test_a_cut_on_a_bound_has_two_derivatives() -> None:
+    """Of `[x < a]` at a = 1 the integral stays as it is to the right of 1."""
+    terms = " + ".join(f"[x < {k / 10}*b]" for k in range(1, 10))
+    f = potto.deriv(potto.compile(f"def f(a, b) integral [0, 1] ([x < a] + {terms})*exp(x) d(x)").f)
+    found = f((1.0, 1.0), (0.9, 0.0))
+    (note,) = found.notes
+    assert note.backward == pytest.approx(np.e, rel=1e-14, abs=0) and note.forward == 0
+
+
+@pytest.mark.parametrize("batch", [1, 50])
+@pytest.mark.parametrize("integrand", ["1/(1 + {})", "exp(x*t)*({})"])
+def test_twice_the_conditions_cost_twice_as_much(integrand: str, batch: int) -> None:
+    """Evaluations, and functions that are called, at parameters that are new at each call."""
+    costs = []
+    for n in (5, 10, 20, 40, 80, 160, 320, 640):
+        terms = " + ".join(f"[x < {k}*t/{n + 1}]" for k in range(1, n + 1))
+        f = potto.deriv(potto.compile(f"def f(t) integral [0, 1] {integrand.format(terms)} d(x)").f)
+        new = iter(np.outer((0.9, 0.3, 0.6, 0.45), np.linspace(0.9, 1.0, batch)))
+
+        def call(f: potto.Function = f, new: object = new) -> potto.Estimate:
+            t = next(new)  # type: ignore[call-overload]
+            return f((float(t[0]), 1.0) if batch == 1 else (t, np.ones(batch)))
+
+        with potto.settings(backend="numpy"):  # when machine code is made depends on the time that numpy took
+            call()
+            call()
+            costs.append((np.sum(call().evals), calls_in(call)))
+    for small, large in itertools.pairwise(costs):
+        assert large[0] <= STEP * small[0]
+        assert large[1] <= STEP * small[1]
