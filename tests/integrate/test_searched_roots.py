@@ -263,3 +263,38 @@ def test_a_pole_where_cells_are_halved_hides_no_root(at: float) -> None:
     assert answer.converged
     assert abs(answer.value - (ends[1] - ends[0])) <= answer.error <= 1e-13
     assert abs(answer.tangent + rate) <= answer.tangent_error + 1e-15 <= 1e-13  # the rate is of some roundings
+
+
+CUBIC, MONOTONE, GROWING = (
+    ("x^3 - x", lambda x, t: x**3 - x - t, ((-2, "-0.5"), ("-0.5", "0.5"), ("0.5", 2))),
+    ("x^3 + x", lambda x, t: x**3 + x - t, ((-1, 1),)),
+    ("x + exp(4*x)", lambda x, t: x + mp.exp(4 * x) - t, ((-1, 0),)),
+)
+
+
+@pytest.mark.parametrize("surface", (CUBIC, MONOTONE, GROWING), ids=lambda surface: surface[0])
+@pytest.mark.parametrize(
+    ("integral", "whole", "density"),
+    (
+        ("integral [-300, 300] BRACKET d(x)", lambda x: x + 300, lambda x: 1),
+        ("integral [-1e31, 1e31] BRACKET d(x)", lambda x: x + mp.mpf(1e31), lambda x: 1),
+        ("integral [-inf, inf] 1/(1 + x^2)*BRACKET d(x)", lambda x: mp.atan(x) + mp.pi / 2, lambda x: 1 / (1 + x**2)),
+        ("integral (x ~ cauchy(0, 2)) BRACKET d(x)", lambda x: mp.atan(x / 2) / mp.pi + mp.mpf(1) / 2,
+         lambda x: 2 / (4 + x**2) / mp.pi),
+    ),
+)  # fmt: skip
+def test_roots_on_a_range_that_reaches_where_numbers_end(
+    surface: tuple[str, Any, Any], integral: str, whole: Any, density: Any
+) -> None:
+    """At the far ends the surface is more than numbers can hold, and most of the range is beyond all roots."""
+    text, psi, brackets = surface
+    t = mp.mpf(0.1)
+    f = potto.compile(f"def f(t)\n    {integral.replace('BRACKET', f'[{text} < t]')}").f
+    roots = [mp.findroot(lambda x: psi(x, t), tuple(map(mp.mpf, pair)), solver="anderson") for pair in brackets]
+    value = sum((-1) ** k * whole(root) for k, root in enumerate(roots))
+    slope = sum(density(root) / abs(mp.diff(lambda x: psi(x, t), root)) for root in roots)
+    answer = potto.deriv(f)((0.1, 1.0))
+    assert answer.converged
+    assert abs(answer.value - value) <= answer.error + 1e-15 * value
+    assert abs(answer.tangent - slope) <= answer.tangent_error + 1e-15 * slope
+    assert answer.error <= 1e-11 * value and answer.tangent_error <= 1e-11 * slope

@@ -20,6 +20,7 @@ from potto.integrate.rules.lowered_intervals import enclosures
 from potto.kernels.cells import Array, Bools, Cell, Ints, Number, Value
 
 FINEST = 48  # halvings of the whole
+WIDE = 2.0**20  # ranges of which the smallest cells are larger than roots are apart: 4e-9
 FAR = (2.0**100, 2.0**30, 2.0**9)  # where signs are looked at that infinity does not tell
 OUTSIDE = 64  # how many of the smallest cells away from one a sign is asked for
 CELLS, CELLS_EACH = 1 << 16, 1 << 9  # at most so many open at once, or so many for each member
@@ -181,17 +182,26 @@ def flat(terms: tuple[Term, ...], env: dict[str, Value]) -> tuple[list[Term], di
 
 
 def between(a: Array, b: Array) -> Array:
-    """A point between the ends, also of what is not finite."""
+    """A point between the ends, also of what is not finite; wide ranges are halved by their digits."""
     middle = 0.5 * (a + b)
+    if (b - a > WIDE).any():
+        middle = np.where(b - a > WIDE, np.sinh(0.5 * (np.arcsinh(a) + np.arcsinh(b))), middle)
     up, down = np.maximum(2 * np.abs(a), 1.0), -np.maximum(2 * np.abs(b), 1.0)
     far = np.where(np.isinf(b), up, np.where(np.isinf(a), down, middle))
     return np.where(np.isinf(a) & np.isinf(b), 0.0, far)
 
 
 def at_label(low: Array, high: Array, s: Array) -> Array:
-    """The places of labels in [0, 1] between bounds that may be infinite."""
+    """The places of labels in [0, 1] between bounds that may be infinite.
+
+    Equal steps of labels are so many digits of places far out, and as many near 0, where bounds are far away.
+    """
     with np.errstate(all="ignore"):
         x = low + (high - low) * s
+        wide = high - low > WIDE
+        if wide.any():
+            start, end = np.arcsinh(low), np.arcsinh(high)
+            x = np.where(wide & np.isfinite(high - low), np.clip(np.sinh(start + (end - start) * s), low, high), x)
         if np.isfinite(x).all():
             return np.where(s == 1, high, x)
         up, down = low + s / (1 - s), high - (1 - s) / s
@@ -248,8 +258,11 @@ class _Cells(Struct, dict=True):
         settled, shallow = ~free & steady, ~free & shallow
         index = np.nonzero(settled)[0]
         known_ends = tuple((low[index], high[index]) for low, high in ends)
-        crossed = self.crossed(owner[index], s0[index], s1[index], known_ends)
-        return index, crossed, np.nonzero(~free & ~settled & ~shallow)[0], np.nonzero(shallow)[0]
+        left, right = self.at_ends(owner[index], s0[index], s1[index], known_ends)
+        signed = ~np.isnan(left) & ~np.isnan(right)  # nor has it a sign where its value is more than numbers can hold
+        settled[index] = signed
+        crossed = _changes(left[signed], right[signed], s1[index][signed])
+        return index[signed], crossed, np.nonzero(~free & ~settled & ~shallow)[0], np.nonzero(shallow)[0]
 
     def enclosed(self, terms: tuple[Term, ...], box: dict[str, Interval], shape: tuple[int, ...]) -> list[Interval]:
         found = enclosures(terms, box, shape[0], self.backend)
@@ -262,11 +275,12 @@ class _Cells(Struct, dict=True):
         (low, high), parts = self.enclosed((self.surface,), box, x.shape)[0], len(places)
         return list(zip(np.split(low, parts), np.split(high, parts), strict=True))
 
-    def crossed(self, owner: Ints, s0: Array, s1: Array, known: tuple[Interval, ...] = ()) -> Bools:
-        """Whether the surface's sign changes over cells. A root on an end belongs to the cell on its right.
+    def crossed(self, owner: Ints, s0: Array, s1: Array) -> Bools:
+        """Whether the surface's sign changes over cells."""
+        return _changes(*self.at_ends(owner, s0, s1), s1)
 
-        known: the surface at both ends, where that has been found out already.
-        """
+    def at_ends(self, owner: Ints, s0: Array, s1: Array, known: tuple[Interval, ...] = ()) -> tuple[Array, Array]:
+        """The surface at both ends of cells, nan where it has no value. known: where that is known already."""
         ends = self.x(owner, s0), self.x(owner, s1)
         values = [_middle_of(at) for at in known or self.at_points(owner, ends)]
         for number, x in enumerate(ends):
@@ -276,8 +290,12 @@ class _Cells(Struct, dict=True):
                     break
                 again = self.at_points(owner, (np.where(lost, np.copysign(size, x), x),))[0]
                 values[number] = np.where(lost, _middle_of(again), values[number])
-        left, right = values
-        return np.asarray((left * np.sign(right) < 0) | ((left == 0) & (right != 0)) | ((right == 0) & (s1 == 1)))
+        return values[0], values[1]
+
+
+def _changes(left: Array, right: Array, s1: Array) -> Bools:
+    """Whether a sign changes over cells that end at s1. A root on an end belongs to the cell on its right."""
+    return np.asarray((left * np.sign(right) < 0) | ((left == 0) & (right != 0)) | ((right == 0) & (s1 == 1)))
 
 
 def _middle_of(value: Interval) -> Array:
