@@ -180,6 +180,7 @@ def _through(
     if isinstance(clause.over, nodes.Range):
         lo, hi = elaboration.term(clause.over.lo, scope), elaboration.term(clause.over.hi, scope)
         name, inner = elaboration.bind_number(clause.variable.name, scope)
+        elaboration.counted.add(name)
     else:
         whole = elaboration.term(clause.over, scope)
         name = elaboration.fresh("i")

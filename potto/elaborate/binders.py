@@ -63,6 +63,8 @@ def _integral(elaboration: Elaboration, node: nodes.Integral, scope: LocalNames)
                 return hole(f"`{bound.measure}` is not a measure of {len(bound.arguments)} parameters")
             choices.append(parts_of(bound.shape, elaboration.terms(bound.arguments, before)))
         names.append(name)
+        if all(part.discrete for part in choices[-1]):
+            elaboration.counted.add(name)
 
     def over(body: Term) -> Term:
         made = [_integral_over(elaboration, node, tuple(names), parts, body) for parts in product(*choices)]

@@ -6,13 +6,14 @@ the result of a diffeomorphism. `a < b` made diffeomorphic is a `Branch` on the 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Set
 
 from potto.core.terms import (
     ONE,
     ZERO,
     App,
     Branch,
+    Const,
     Global,
     Hole,
     If,
@@ -31,6 +32,7 @@ from potto.core.terms import (
 
 COMPARISONS = frozenset(("lt", "le", "eq", "ne"))
 LOGIC = frozenset(("and", "or", "not"))
+_EVERYWHERE = frozenset(("add", "neg", "mul", "abs", "min", "max"))  # defined for all numbers
 Note = Callable[[Term, Term], None]  # (the condition, the branch that was made of it)
 
 
@@ -103,13 +105,16 @@ def _opposite(part: Term) -> Term:
     return negated(part) if is_truth(part) else prim("not", part)
 
 
-def choose(condition: Term, then: Term, orelse: Term, jumps: bool, note: Note) -> Term:
-    """`then` where a condition holds, else `orelse`. `jumps`: comparisons are made diffeomorphic."""
+def choose(
+    condition: Term, then: Term, orelse: Term, jumps: bool, note: Note, counted: Set[str] = frozenset()
+) -> Term:  # fmt: skip
+    """`then` where a condition holds, else `orelse`. `jumps`: comparisons are made diffeomorphic, but for those of
+    numbers that count something, by these names."""
     if is_truth(condition):
         assert isinstance(condition, Prim)
         if not jumps and not _has_bracket(condition):
             return if_(condition, then, orelse)
-        return _chosen(condition, then, orelse, jumps, note)
+        return _chosen(condition, then, orelse, jumps, note, counted)
     if is_indicator(condition):
         return _refilled(condition, then, orelse, note)
     if isinstance(condition, Hole):
@@ -142,20 +147,20 @@ def _has_bracket(condition: Prim) -> bool:
     return False
 
 
-def _chosen(condition: Prim, then: Term, orelse: Term, jumps: bool, note: Note) -> Term:
+def _chosen(condition: Prim, then: Term, orelse: Term, jumps: bool, note: Note, counted: Set[str]) -> Term:
     match condition.op:
         case "and" | "or":
             first, rest = condition.args
-            inner = choose(rest, then, orelse, jumps, note)
+            inner = choose(rest, then, orelse, jumps, note, counted)
             if condition.op == "and":
-                return choose(first, inner, orelse, jumps, note)
-            return choose(first, then, inner, jumps, note)
+                return choose(first, inner, orelse, jumps, note, counted)
+            return choose(first, then, inner, jumps, note, counted)
         case "not":
             inside = condition.args[0]
             if is_truth(inside):
-                return choose(negated(inside), then, orelse, jumps, note)
-            return choose(inside, orelse, then, jumps, note)
-        case "lt" | "le" if jumps and not _fixed(condition):
+                return choose(negated(inside), then, orelse, jumps, note, counted)
+            return choose(inside, orelse, then, jumps, note, counted)
+        case "lt" | "le" if jumps and not _fixed(condition, counted):
             a, b = condition.args
             made = branch((sub(b, a),), condition.op == "lt", then, orelse)
             note(condition, made)
@@ -164,9 +169,17 @@ def _chosen(condition: Prim, then: Term, orelse: Term, jumps: bool, note: Note) 
             return if_(condition, then, orelse)
 
 
-def _fixed(condition: Prim) -> bool:
-    """Whether a comparison is between numbers that nothing moves: there is no surface then."""
-    return not condition.free and not any(isinstance(part, App | Global) for part in postorder(condition))
+def _fixed(condition: Prim, counted: Set[str]) -> bool:
+    """Whether a comparison is between numbers that nothing moves: there is no surface then.
+
+    What has no value for some numbers stays a surface, which says so.
+    """
+    if not condition.free:
+        return not any(isinstance(part, App | Global) for part in postorder(condition))
+    sides = postorder(*condition.args)
+    return condition.free <= counted and all(
+        isinstance(part, Var | Const) or (isinstance(part, Prim) and part.op in _EVERYWHERE) for part in sides
+    )
 
 
 def _refilled(indicator: Term, then: Term, orelse: Term, note: Note) -> Term:

@@ -46,6 +46,7 @@ class Elaboration:
         self.db, self.file = db, file
         self.taken = set(taken)
         self.numbers: set[str] = set()  # binders that stand for one number each: variables of integration, indices
+        self.counted: set[str] = set()  # those of them that go through whole numbers, which nothing moves
         self.shapes = Shapes(db)
         self.origins: dict[Term, Span] = {}
         self.places: dict[Term, Span] = {}  # where conditions were written

@@ -131,7 +131,7 @@ def _bracket(elaboration: Elaboration, node: nodes.Bracket, scope: LocalNames) -
 def _iverson(elaboration: Elaboration, condition: Term, node: nodes.Bracket | nodes.ListLiteral) -> Term:
     if isinstance(condition, Hole):
         return condition
-    return choose(condition, ONE, ZERO, True, elaboration.noting(node.span))
+    return choose(condition, ONE, ZERO, True, elaboration.noting(node.span), elaboration.counted)
 
 
 @rule(nodes.If)

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
+from typing import Any
+
 import pytest
 from mpmath import mp
 
@@ -107,3 +111,40 @@ def test_a_rate_that_varies_inside() -> None:
 def test_what_is_not_valid(name: str, values: tuple[float, ...]) -> None:
     with pytest.raises(potto.PottoError, match=r"trials must be whole|rate must be positive|between 0 and 1"):
         getattr(PROGRAM, name)(*values)
+
+
+SECOND: dict[str, tuple[str, Callable[[Any], Any]]] = {
+    "k > 2": ("integral (k ~ poisson(t)) [k > 2] d(k)", lambda t: 1 - mp.exp(-t) * (1 + t + t * t / 2)),
+    "an edge between two": (
+        "integral (k ~ poisson(t), l ~ bernoulli(t/2)) [k > l] d(k, l)",
+        lambda t: (1 - t / 2) * (1 - mp.exp(-t)) + t / 2 * (1 - mp.exp(-t) * (1 + t)),
+    ),
+    "a case": (
+        "integral (k ~ binomial(3, t/2)) (if [k >= 2] then t*k else t^3) d(k)",
+        lambda t: sum(
+            mp.binomial(3, k) * (t / 2) ** k * (1 - t / 2) ** (3 - k) * (t * k if k >= 2 else t**3) for k in range(4)
+        ),
+    ),
+    "beside another": (
+        "integral (x ~ normal(0, 1), k ~ poisson(t)) [k >= 1 and x < t*k] d(x, k)",
+        lambda t: sum(poisson(k, t) * mp.ncdf(t * k) for k in range(1, 60)),
+    ),
+    "a sum": ("sum i in 0..4, j in 0..4 ([i > j and i + j <= 4]*t^(i + j))", lambda t: t + t**2 + 2 * t**3 + 2 * t**4),
+}
+
+
+@pytest.mark.parametrize("name", SECOND)
+def test_a_condition_that_numbers_meet_exactly_has_second_derivatives(name: str) -> None:
+    program, exact = SECOND[name]
+    f = potto.compile(f"def f(t)\n    {program}").f
+    answer = potto.hessian(f)(0.7)
+    with mp.workdps(40):
+        second = mp.diff(exact, mp.mpf(0.7), 2)
+    assert answer.converged
+    assert abs(answer.value - second) <= answer.error + 1e-15 * abs(second)
+    assert answer.error <= 1e-11
+    assert not f.surfaces or name == "beside another"
+
+
+def test_an_edge_that_has_no_value_for_some_numbers_stays_undefined() -> None:
+    assert math.isnan(potto.compile("def f(t)\n    sum k in 0..3 ([sqrt(k - 2) >= 1]*t)").f(1.0).value)
