@@ -5,6 +5,7 @@ H(y) is the length of [exp(z) + z - 1 > y] in [0, 1], 1 - Z(y) for Z(y) = y + 1 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import mpmath
@@ -164,3 +165,31 @@ def rim(a) integral [0, 1] snd(deriv(mixed)((x, 0), (a, 1))) d(x)
     (note,) = m.rim(0.0).notes  # on the very edge of the domain there is none of it, and the sides differ
     assert m.rim(0.0).value == 0 and note.surface == "a - x = 0"
     assert abs(note.backward) <= 1e-14 and abs(note.forward + 2) <= 1e-13
+
+
+@pytest.mark.parametrize(
+    ("region", "at", "area", "rate"),
+    (
+        # on the unit sphere each region is the cap x < h, of area 2 pi (1 + h), and the delta of its square is half
+        ("x + x^2 + y^2 + z^2 < 1 + t", 0.3, math.pi * 1.3, math.pi),
+        ("x + sqrt(x^2 + y^2 + z^2) < 1 + t", 0.3, math.pi * 1.3, math.pi),
+        ("(x + t)^2 + y^2 + z^2 < 1", 0.8, math.pi * 0.6, -math.pi / 2),
+    ),
+)
+def test_a_level_set_that_a_surface_cuts_in_a_circle(region: str, at: float, area: float, rate: float) -> None:
+    """Along y and z the circle has no places by itself: it is all of x = h."""
+    box = "([-3, 3], [-3, 3], [-3, 3])"
+    f = potto.compile(f"def f(t)\n    integral {box} [{region}]*delta(1 - x^2 - y^2 - z^2) d(x, y, z)").f
+    answer = potto.deriv(f)((at, 1.0))
+    assert answer.converged
+    assert abs(answer.value - area) <= answer.error + 1e-15 * area <= 1e-10
+    assert abs(answer.tangent - rate) <= answer.tangent_error + 4e-15 <= 1e-10
+
+
+@pytest.mark.parametrize("order", ("x, y, z", "z, y, x", "y, x, z"))
+def test_the_second_derivative_of_what_two_balls_share(order: str) -> None:
+    """A lens of unit balls at the distance d: pi (4 + d) (2 - d)^2/12, whose second derivative is pi d/2."""
+    balls = "[x^2 + y^2 + z^2 < 1]*[(x - d)^2 + y^2 + z^2 < 1]"
+    f = potto.compile(f"def f(d)\n    integral ([-2, 2], [-2, 2], [-2, 2]) {balls} d({order})").f
+    answer = potto.hessian(f)(1.2)
+    assert abs(answer.value - 0.6 * math.pi) <= answer.error + 1e-14 <= 1e-10

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from functools import lru_cache
 
+from potto.calculus.algebra.rational_form import settled
 from potto.calculus.decomposition.circular_regions import Edges
 from potto.calculus.decomposition.critical import Critical, Within, folds, infinite, scattered, shadows
 from potto.calculus.decomposition.surface_cuts import RATIONAL, Cut, along, sections_in
@@ -33,9 +34,12 @@ def further_systems(
     yield from shadows(systems[:MOST_PAIRS], variable, lo, hi, roots, searched)
 
 
-def shadows_of_cuts(cuts: Sequence[Cut], edges: Edges, within: Within, further: frozenset[str]) -> Iterator[Shadow]:
-    """What the cuts of one variable leave in those further out. edges: further cuts, the lines and circles around a
-    region, whose crossings with each other are its corners, which are looked for by themselves."""
+def shadows_of_cuts(
+    cuts: Sequence[Cut], edges: Edges, within: Within, further: frozenset[str], nearest: str
+) -> Iterator[Shadow]:  # fmt: skip
+    """What the cuts of one variable leave in those further out, `nearest` the first of these. edges: further cuts, the
+    lines and circles around a region, whose crossings with each other are its corners, which are looked for by
+    themselves."""
     lines, circles = edges
     for cut in (*cuts, *circles):
         yield from _at_bounds(cut, within, False)
@@ -44,13 +48,13 @@ def shadows_of_cuts(cuts: Sequence[Cut], edges: Edges, within: Within, further: 
     for first in meeting:
         for second in meeting:
             if first is not second and first.key.digest < second.key.digest:
-                yield from _crossings(first, second, within, further)
+                yield from _crossings(first, second, within, further, nearest)
         for edge in (*lines, *circles):
-            yield from _crossings(first, edge, within, further)
+            yield from _crossings(first, edge, within, further, nearest)
 
 
 def shadows_of_roots(
-    own: Cut, cuts: tuple[Cut, ...], within: Within, further: frozenset[str], alone: bool
+    own: Cut, cuts: tuple[Cut, ...], within: Within, further: frozenset[str], nearest: str, alone: bool
 ) -> Iterator[Shadow]:
     """What a sum over the roots of one surface leaves: it jumps where they meet a bound, or a jump of what is summed.
 
@@ -60,7 +64,7 @@ def shadows_of_roots(
     yield from _turning(own, within, further, alone)
     for cut in cuts:
         if cut.decides:
-            yield from _crossings(own, cut, within, further, True)
+            yield from _crossings(own, cut, within, further, nearest, True)
 
 
 def _at_bounds(cut: Cut, within: Within, steps: bool) -> Iterator[Shadow]:
@@ -104,7 +108,7 @@ def _by_numbers(surface: Term, variable: str, further: frozenset[str]) -> bool:
 
 
 def _crossings(
-    first: Cut, second: Cut, within: Within, further: frozenset[str], steps: bool = False
+    first: Cut, second: Cut, within: Within, further: frozenset[str], nearest: str, steps: bool = False
 ) -> Iterator[Shadow]:
     """Where two sections meet: the simpler one's roots put into the other's surface, where they are all known."""
     solved = [c for c in (first, second) if c.roots is not None and not c.families]
@@ -113,12 +117,16 @@ def _crossings(
         any(_radical(root) for root in a.roots or ())
         and all(_by_numbers(along(c), within.variable, further) for c in (first, second))
     )
-    if a is None or searched:
+    meetings: list[Term] = []
+    if a is not None:
+        b = second if a is first else first
+        meetings = [simplify(substitute(b.surface, {within.variable: root})) for root in a.roots or ()]
+    if searched:  # by numbers, where the places are isolated: of two spheres a circle may be at one distance from here
+        meetings = [settled(meeting, frozenset((nearest,))) for meeting in meetings]
+    if a is None or (searched and any(nearest in meeting.free for meeting in meetings)):
         yield Critical((along(first), along(second)), (within,), False, steps)
         return
-    b = second if a is first else first
-    for root in a.roots or ():
-        meeting = simplify(substitute(b.surface, {within.variable: root}))
+    for meeting in meetings:
         if meeting.free:
             yield meeting, False, steps
 

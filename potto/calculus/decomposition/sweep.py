@@ -185,7 +185,8 @@ def _level(
     polynomial: gives the integrand in the sides of surfaces."""
     cuts = tuple(cut_of(placed, variable) for placed in pool.take(variable))
     decisive, others = [c for c in cuts if c.decides], [c for c in cuts if not c.decides]
-    further = frozenset(pool.variables[: pool.variables.index(variable)])
+    outer = pool.variables[: pool.variables.index(variable)]
+    further, nearest = frozenset(outer), outer[-1] if outer else ""
     within = Within(variable, *bounds)
     region, (lines, circles), covers = circular_region(decisive, within, further, polynomial)
     alone = [cut for cut in decisive if cut not in lines and cut not in circles]
@@ -195,9 +196,9 @@ def _level(
     own = None if over is None else cut_along(over.surface, variable)
     if not last:
         if over is None or own is None:
-            shadows = shadows_of_cuts((*alone, *others[:MOST_CUTS]), (lines, circles), within, further)
+            shadows = shadows_of_cuts((*alone, *others[:MOST_CUTS]), (lines, circles), within, further, nearest)
         else:
-            shadows = shadows_of_roots(own, cuts, within, further, len(over.shares) == 1)
+            shadows = shadows_of_roots(own, cuts, within, further, nearest, len(over.shares) == 1)
         for shadow in shadows:
             if isinstance(shadow, Critical):
                 pool.critical[shadow] = None
