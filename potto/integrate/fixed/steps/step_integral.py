@@ -108,7 +108,7 @@ class _Reading:
         self.linear: set[Term] = set()
         self.names: dict[Term, str] = {}
         for node in postorder(body, below=lambda node: () if self._still(node) else children(node)):
-            if self._is_linear(node):
+            if not self._still(node) and self._is_linear(node):
                 self.linear.add(node)
 
     def _still(self, node: Term) -> bool:
