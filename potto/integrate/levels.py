@@ -11,8 +11,9 @@ from typing import Any
 
 from msgspec import Struct
 
-from potto.calculus.decomposition.circular_regions import polynomial
-from potto.calculus.decomposition.surface_cuts import CircularRegion, Cut
+from potto.calculus.decomposition.conic_regions import polynomial
+from potto.calculus.decomposition.critical import Within
+from potto.calculus.decomposition.surface_cuts import ConicRegion, Cut
 from potto.calculus.decomposition.sweep import Level
 from potto.core.terms import INF, Lam, Term, function_of, neg, postorder, prim, tuple_
 
@@ -74,13 +75,13 @@ class LevelPlan(Struct, frozen=True, dict=True):
 
 
 class Corners(Struct, frozen=True):
-    """The corners of a region as a cut: its number, how many lines there are, the numbers of these and of circles, the
-    variable further in, and the surfaces of circles and lines."""
+    """The corners of a region as a cut: its number, how many lines there are, the numbers of these and of conics, the
+    variable further in with its bounds, and the surfaces of conics and lines."""
 
     cut: int
     lines: int
     numbers: Lam
-    further_in: str
+    within: Within
     surfaces: Lam
     polynomial: Lam | None
 
@@ -152,11 +153,11 @@ def level_plan(level: Level, decided: tuple[int, ...], groups: Sequence[Group]) 
     )
 
 
-def _corners(cut: int, region: CircularRegion) -> Corners:
-    numbers = (number for edge in (*region.lines, *region.circles) for number in edge)
+def _corners(cut: int, region: ConicRegion) -> Corners:
+    numbers = (number for edge in (*region.lines, *region.conics) for number in edge)
     surfaces = function_of(tuple_(region.surfaces))
     polynomial = None if region.polynomial is None else function_of(region.polynomial)
-    return Corners(cut, len(region.lines), function_of(tuple_(tuple(numbers))), region.further_in, surfaces, polynomial)
+    return Corners(cut, len(region.lines), function_of(tuple_(tuple(numbers))), region.within, surfaces, polynomial)
 
 
 def _walls(level: Level, rows: Sequence[tuple[int, bool]]) -> tuple[tuple[tuple[int, ...], ...], Lam]:

@@ -59,10 +59,11 @@ def area(shapes: list[Ellipse], t: float) -> tuple[float, float]:
 @pytest.mark.parametrize(("n", "seed"), [(6, 1), (6, 2), (10, 1)])
 def test_jumps_beside_the_ends_of_pieces_count(n: int, seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """The slope of what is further in jumps at a corner that is no cut. Beyond the last node of a piece none sees it:
-    slopes were off by up to 6,500 of their errors. 1e-14: what the reference is rounded by."""
+    slopes were off by up to 6,500 of their errors. Written with exp, so that ellipses are not known to be conics, of
+    which all corners are found. 1e-14: what the reference is rounded by."""
     monkeypatch.setattr(projection, "MOST_JUMPS", 3)
     shapes = ellipses(n, seed)
-    inside = " and ".join(f"(x - ({a}))^2/{c} + (y - ({b}))^2/{d} < t" for a, b, c, d in shapes)
+    inside = " and ".join(f"exp((x - ({a}))^2/{c} + (y - ({b}))^2/{d}) < exp(t)" for a, b, c, d in shapes)
     answer = potto.deriv(potto.compile(f"def f(t) integral ([-3, 3], [-3, 3]) [{inside}] d(x, y)").f)((0.9, 1.0))
     value, slope = area(shapes, 0.9)
     assert abs(answer.value - value) <= answer.error + 1e-14 and answer.error < 1e-6

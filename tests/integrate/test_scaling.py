@@ -76,6 +76,26 @@ def chain(n: int) -> tuple[str, dict[str, float]]:
     return f"def f(t) integral ([0, 1], [0, 1]) [max({', '.join(discs)}) > 0] d(x, y)", {"t": 0.8 / n}
 
 
+def ellipses(n: int) -> tuple[str, dict[str, float]]:
+    """What ellipses around a middle share, each turned another way."""
+    turned = (ellipse(a, 0.3, 2.7 * a, 1.0, 1.15) for a in (2 * math.pi * (k + 0.3) / n for k in range(n)))
+    return f"def f(t) integral ([-2, 2], [-2, 2]) [{' and '.join(turned)}] d(x, y)", {"t": 0.9}
+
+
+def row(n: int) -> tuple[str, dict[str, float]]:
+    """What ellipses in a row cover, each of which overlaps with its neighbours."""
+    middles = (((k + 0.5) / n, 0.2 * math.sin(7 * (k + 0.5) / n)) for k in range(n))
+    along = (ellipse(math.atan2(y, x), math.hypot(x, y), 0.4, 0.9 / n, 0.7 / n) for x, y in middles)
+    return f"def f(t) integral ([0, 1], [-1, 1]) [{' or '.join(along)}] d(x, y)", {"t": 0.9}
+
+
+def ellipse(angle: float, far: float, turn: float, a: float, b: float) -> str:
+    """With half axes a and b, turned, and its middle so far in a direction."""
+    c, s = math.cos(turn), math.sin(turn)
+    x, y = far * math.cos(angle - turn), far * math.sin(angle - turn)
+    return f"({c!r}*x + ({s!r})*y - ({x!r}))^2/{a * a!r} + ({c!r}*y - ({s!r})*x - ({y!r}))^2/{b * b!r} < t"
+
+
 def builtins(n: int) -> tuple[str, dict[str, float]]:
     terms = " + ".join(f"sin({k}/{n}*x*t)*exp(-{k}/{n}*x)" for k in range(1, n + 1))
     return f"def f(t) integral [0, 1] ({terms})*[x < t] d(x)", {"t": 0.7}
@@ -90,6 +110,7 @@ def counted(call: Callable[[], Any]) -> tuple[int, int]:
     (conditions, (20, 40, 80)), (one_parameter, (160, 320, 640)), (own_parameters, (40, 80, 160)),
     (triangles, (12, 24, 48)), (polygon, (16, 32, 64)), (discs, (24, 48, 96)),
     (union, (10, 20, 40, 80)), (chain, (10, 20, 40, 80)),
+    (ellipses, (10, 20, 40, 80)), (row, (10, 20, 40)),
     (builtins, (80, 160, 320)),  # below, fewer nodes do
 ])  # fmt: skip
 @pytest.mark.parametrize("gradient", [False, True])

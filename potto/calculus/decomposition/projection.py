@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from functools import lru_cache
 
 from potto.calculus.algebra.rational_form import settled
-from potto.calculus.decomposition.circular_regions import Edges
+from potto.calculus.decomposition.conic_regions import Edges
 from potto.calculus.decomposition.critical import Critical, Within, folds, infinite, scattered, shadows
 from potto.calculus.decomposition.surface_cuts import RATIONAL, Cut, along, sections_in
 from potto.calculus.solving.enclosable import slope_of
@@ -38,10 +38,10 @@ def shadows_of_cuts(
     cuts: Sequence[Cut], edges: Edges, within: Within, further: frozenset[str], nearest: str
 ) -> Iterator[Shadow]:  # fmt: skip
     """What the cuts of one variable leave in those further out, `nearest` the first of these. edges: further cuts, the
-    lines and circles around a region, whose crossings with each other are its corners, which are looked for by
+    lines and conics around a region, whose crossings with each other are its corners, which are looked for by
     themselves."""
-    lines, circles = edges
-    for cut in (*cuts, *circles):
+    lines, conics = edges
+    for cut in (*cuts, *conics):
         yield from _at_bounds(cut, within, False)
         yield from _turning(cut, within, further)
     meeting, _ = crossing(cuts, within.variable, further)
@@ -49,7 +49,7 @@ def shadows_of_cuts(
         for second in meeting:
             if first is not second and first.key.digest < second.key.digest:
                 yield from _crossings(first, second, within, further, nearest)
-        for edge in (*lines, *circles):
+        for edge in (*lines, *conics):
             yield from _crossings(first, edge, within, further, nearest)
 
 

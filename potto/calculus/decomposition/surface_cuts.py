@@ -1,6 +1,6 @@
 """Surfaces as cuts of one variable: what they decide, what they are a product of, and where their roots are.
 
-Owns `Cut`, `WrittenSurface`, `Product` and `CircularRegion`.
+Owns `Cut`, `WrittenSurface`, `Product` and `ConicRegion`.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from msgspec.structs import replace
 
 from potto.calculus.algebra.radicals import minus
 from potto.calculus.algebra.ranges import positive
+from potto.calculus.decomposition.critical import Within
 from potto.calculus.solving.enclosable import slope_of
 from potto.calculus.solving.solve import Family, Sections, Unsolvable, sections, shared_factors
 from potto.core.simplify import normalized_surface
@@ -67,7 +68,7 @@ class Cut(Struct, frozen=True):
     holds: int = 0
     bends: bool = False
     covers: int | None = None
-    corners: CircularRegion | None = None
+    corners: ConicRegion | None = None
 
     @property
     def decides(self) -> bool:
@@ -86,24 +87,24 @@ class Product(Struct, frozen=True):
     sign: int
 
 
-class CircularRegion(Struct, frozen=True):
-    """What half planes a*x + b*y + c >= 0, and discs and their complements, q*(x^2 + y^2) + a*x + b*y + c >= 0, bound
+class ConicRegion(Struct, frozen=True):
+    """What half planes a*x + b*y + c >= 0 and one side of conics a*x^2 + b*x*y + c*y^2 + d*x + e*y + f >= 0 bound
     together, x the variable that is cut, y the next one further in.
 
-    lines: a, b and c of each; the last two are those above the lower and below the upper bound of y. circles: q, a, b
-    and c. further_in: y. surfaces: of circles, then of lines, as they were written: multiplied out they lose digits.
-    polynomial: what is integrated as a polynomial in the `sides` of circles, then of lines; None for an intersection.
+    lines: a, b and c of each; the last two are those above the lower and below the upper bound of y. conics: a to f.
+    within: y and its bounds. surfaces: of conics, then of lines, as they were written: multiplied out they lose digits.
+    polynomial: what is integrated as a polynomial in the `sides` of conics, then of lines; None for an intersection.
     """
 
     lines: tuple[tuple[Term, ...], ...]
-    circles: tuple[tuple[Term, ...], ...]
-    further_in: str
+    conics: tuple[tuple[Term, ...], ...]
+    within: Within
     surfaces: tuple[Term, ...]
     polynomial: Term | None = None
 
 
 def side(number: int) -> str:
-    """The name of 1 where a circle or line of a region is >= 0, and else of 0."""
+    """The name of 1 where a conic or line of a region is >= 0, and else of 0."""
     return f"side_{number}"
 
 

@@ -15,13 +15,13 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from potto.calculus.algebra.rational_form import settled
-from potto.calculus.decomposition.circular_regions import Polynomial, circular_region
+from potto.calculus.decomposition.conic_regions import Polynomial, conic_region
 from potto.calculus.decomposition.critical import Critical, Within
 from potto.calculus.decomposition.projection import crossing, further_systems, shadows_of_cuts, shadows_of_roots
 from potto.calculus.decomposition.side_polynomials import by_sides
 from potto.calculus.decomposition.surface_cuts import (
     MOST_CENTERS,
-    CircularRegion,
+    ConicRegion,
     Cut,
     Jump,
     Placed,
@@ -70,7 +70,7 @@ class _Pool(Struct):
     centers: dict[Term, None] = {}
     critical: dict[Critical, None] = {}
     edges: dict[Term, None] = {}
-    corners: list[CircularRegion] = []
+    corners: list[ConicRegion] = []
 
     def find(self, finding: Finding) -> None:
         if finding.critical is not None:
@@ -188,15 +188,15 @@ def _level(
     outer = pool.variables[: pool.variables.index(variable)]
     further, nearest = frozenset(outer), outer[-1] if outer else ""
     within = Within(variable, *bounds)
-    region, (lines, circles), covers = circular_region(decisive, within, further, polynomial)
-    alone = [cut for cut in decisive if cut not in lines and cut not in circles]
+    region, (lines, conics), covers = conic_region(decisive, within, further, polynomial)
+    alone = [cut for cut in decisive if cut not in lines and cut not in conics]
     complete = len(others) <= MOST_CUTS and crossing((*alone, *others), variable, further)[1]
     cuts = (*decisive, *others[:MOST_CUTS])
     (here, systems), edges = pool.take_points(variable), pool.take_edges(variable)
     own = None if over is None else cut_along(over.surface, variable)
     if not last:
         if over is None or own is None:
-            shadows = shadows_of_cuts((*alone, *others[:MOST_CUTS]), (lines, circles), within, further, nearest)
+            shadows = shadows_of_cuts((*alone, *others[:MOST_CUTS]), (lines, conics), within, further, nearest)
         else:
             shadows = shadows_of_roots(own, cuts, within, further, nearest, len(over.shares) == 1)
         for shadow in shadows:

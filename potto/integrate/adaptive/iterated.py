@@ -218,7 +218,7 @@ class Iteration(Struct):
             rows = within_walls(level, rows, env, batch, machine, face)
         if level.covers:
             rows = uncovered(level, rows, env, batch, machine, face)
-        corners = corner_rows(level, env, batch, machine) if level.corners else []
+        corners = corner_rows(level, env, lo, hi, batch, machine) if level.corners else []
         found, lost = self.searched(level, env, lo, hi, batch, machine)
         return lo, hi, rows + corners + found, lost
 
@@ -247,7 +247,7 @@ class Iteration(Struct):
         summed = self.plan.over is not None and level is self.plan.levels[-1]
         rows = searched_rows(level, env, lo, hi, batch, machine, summed)
         if critical:
-            rows += critical_rows(level, env, lo, hi, near, batch, machine)
+            rows += critical_rows(critical, level.variable, env, lo, hi, near, batch, machine)
         return rows, None if lost is None else self.further_in * lost
 
     def ranges(

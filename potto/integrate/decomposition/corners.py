@@ -1,9 +1,9 @@
-"""The corners of regions of half planes and discs, and the edges of a range that is an intersection of such.
+"""The corners of regions of half planes and conics, and the edges of a range that is an intersection of such.
 
-Owns `corner_rows` and `within_walls`. What is integrated is 0 outside of an intersection, so that lines and circles
+Owns `corner_rows` and `within_walls`. What is integrated is 0 outside of an intersection, so that lines and conics
 that cross there leave nothing: of n^2/2 crossings the corners count alone. Each line is clipped by all others (Cyrus
-and Beck 1978), which takes n^2 sums and products, and no formula; where a circle takes part, or a union, crossings are
-held against all the others (`circle_corners`). Whatever rounding does not settle counts.
+and Beck 1978), which takes n^2 sums and products, and no formula; where a conic takes part, or a union, crossings are
+held against all the others (`conic_corners`). Whatever rounding does not settle counts.
 """
 
 from __future__ import annotations
@@ -15,18 +15,22 @@ import numpy as np
 from msgspec import Struct
 from msgspec.structs import replace
 
-from potto.core.terms import Lam, Term
+from potto.calculus.decomposition.critical import Critical
+from potto.core.terms import Lam, Term, children
 from potto.integrate.columns import distinct, side_by_side
-from potto.integrate.decomposition.circle_corners import BESIDE, CLEAR, circle_corners, mixed_corners, moving
+from potto.integrate.decomposition.conic_corners import BESIDE, CLEAR, Places, conic_corners, mixed_corners, moving
+from potto.integrate.decomposition.critical_places import critical_rows
 from potto.integrate.decomposition.meetings import Row, as_array, tangents
 from potto.integrate.events import Unsearched
-from potto.integrate.levels import LevelPlan
+from potto.integrate.levels import Corners, LevelPlan
+from potto.integrate.pieces import gather
 from potto.integrate.rules.gauss import EPS
 from potto.kernels.cells import Array, Cell, Ints, Value
 
 ROUNDED = 2 * EPS  # of the sizes of its summands: how far off a sum of products is
 FINEST = 4 * EPS**2  # the same with what rounding took from each product
 SPLITS = 2.0**27 + 1
+NEAR = 1e-3  # of the size of its place: what is not known to that of a corner is not known at all
 MOST_NUMBERS = 1 << 18  # that are clipped at once
 
 
@@ -93,9 +97,10 @@ def _doubt(a: Sequence[Array], b: Sequence[Array]) -> Array:
     return a[1] * np.abs(b[0]) + b[1] * np.abs(a[0])
 
 
-def corner_rows(level: LevelPlan, env: dict[str, Value], batch: int, machine: Any) -> list[Row]:
+def corner_rows(level: LevelPlan, env: dict[str, Value], lo: Cell, hi: Cell, batch: int, machine: Any) -> list[Row]:
     """The cuts of one variable at the corners of regions."""
     rows: list[Row] = []
+    span = as_array(np.minimum(lo.v, hi.v), batch), as_array(np.maximum(lo.v, hi.v), batch)
     for region in level.corners:
         values = machine.tracking().evaluate(region.numbers, {n: env[n] for n in region.numbers.params}, None)
         numbers = _numbers(values, batch, machine.directions)
@@ -103,11 +108,16 @@ def corner_rows(level: LevelPlan, env: dict[str, Value], batch: int, machine: An
         if unknown.any():
             machine.note(Unsearched(level.variable), np.nonzero(unknown)[0])
         lines = _Lines(*(_apart(of[..., : 3 * region.lines, :], 3) for of in numbers)).in_order()
-        circles = tuple(_apart(of[..., 3 * region.lines :, :], 4) for of in numbers[:2])
-        straight, pairs = _crossing(lines, circles, region.polynomial, machine)
+        conics = tuple(_apart(of[..., 3 * region.lines :, :], 6) for of in numbers[:2])
+        straight, places = _crossing(lines, conics, span, region.polynomial, machine)
         found = [(straight[2], *lines.crossings(*straight))]
-        if circles[0].size:
-            found.append(moving(region, level.variable, env, *pairs, machine))
+        if conics[0].size:
+            lost = ~(places.off <= NEAR * (1 + np.abs(places.place[0])))
+            if lost.any():
+                machine.note(Unsearched(level.variable), distinct(places.owner[lost]))
+            told = places.sure | lost
+            found.append(moving(region, level.variable, env, places.pick(told), machine))
+            rows += _touching(region, places.pick(~told), level.variable, env, batch, machine)
         owner, x, e, t, et = (np.concatenate(of, axis=-1) for of in zip(*found, strict=True))
         order = np.lexsort((x, owner))
         x, e, t, et = (side_by_side(owner[order], of[..., order], batch, gap)
@@ -116,22 +126,36 @@ def corner_rows(level: LevelPlan, env: dict[str, Value], batch: int, machine: An
     return rows
 
 
+def _touching(
+    region: Corners, places: Places, variable: str, env: dict[str, Value], batch: int, machine: Any
+) -> list[Row]:
+    """Cuts where conics touch: what their numbers do not tell, a search does for places, about there, at which both
+    surfaces are 0 as they were written."""
+    rows: list[Row] = []
+    surfaces = children(region.surfaces.body)
+    for pair in distinct(places.p * len(surfaces) + places.q):
+        p, q = divmod(int(pair), len(surfaces))
+        here = places.pick((places.p == p) & (places.q == q))
+        low, high = (Cell(here.place[0] + sign * here.off) for sign in (-1.0, 1.0))
+        system = Critical((surfaces[p], surfaces[q]), (region.within,))
+        for row in critical_rows([system], variable, gather(env, here.owner), low, high, {}, here.owner.size, machine):
+            order = np.argsort(here.owner, kind="stable")
+            found = side_by_side(here.owner[order], np.stack((row.x, row.e))[:, order], batch)
+            rows += [Row(x, (), row.cut, False, e) for x, e in zip(*found, strict=True)]
+    return rows
+
+
 def _crossing(
-    lines: _Lines, circles: Sequence[Array], polynomial: Lam | None, machine: Any
-) -> tuple[tuple[Ints, Ints, Ints], tuple[Ints, Ints, Ints, Array, Array]]:
-    """Which two lines cross where there may be a corner, and of which member; and where circles take part."""
+    lines: _Lines, conics: Sequence[Array], span: tuple[Array, Array], polynomial: Lam | None, machine: Any
+) -> tuple[tuple[Ints, Ints, Ints], Places]:
+    """Which two lines cross where there may be a corner, and of which member; and where conics take part."""
     if polynomial is None:
-        return _corners(lines), circle_corners((lines.v, lines.e), circles)
-    p, q, owner, place, off = mixed_corners((lines.v, lines.e), circles, polynomial, machine)
-    first = circles[0].shape[1]
-    flat = p >= first
-    return (p[flat] - first, q[flat] - first, owner[flat]), (
-        p[~flat],
-        q[~flat],
-        owner[~flat],
-        place[:, ~flat],
-        off[~flat],
-    )
+        return _corners(lines), conic_corners((lines.v, lines.e), conics, span)
+    places = mixed_corners((lines.v, lines.e), conics, span, polynomial, machine)
+    first = conics[0].shape[1]
+    flat = places.p >= first
+    straight = places.pick(flat)
+    return (straight.p - first, straight.q - first, straight.owner), places.pick(~flat)
 
 
 def _numbers(values: Value, batch: int, directions: int) -> tuple[Array, Array, Array, Array]:
@@ -146,7 +170,7 @@ def _numbers(values: Value, batch: int, directions: int) -> tuple[Array, Array, 
 
 
 def _apart(of: Array, each: int) -> Array:
-    """Numbers (..., n, B) of lines or circles: (..., each, n/each, B)."""
+    """Numbers (..., n, B) of lines or conics: (..., each, n/each, B)."""
     *outer, count, batch = of.shape
     return np.moveaxis(of.reshape(*outer, count // each, each, batch), -2, -3)
 

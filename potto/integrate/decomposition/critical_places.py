@@ -22,7 +22,6 @@ from potto.integrate.decomposition.effective_range import Ranges
 from potto.integrate.decomposition.meetings import SEARCHED, Row, as_array, tangents
 from potto.integrate.decomposition.root_isolation import between, flat
 from potto.integrate.events import Unsearched
-from potto.integrate.levels import LevelPlan
 from potto.integrate.pieces import gather
 from potto.integrate.rules.gauss import EPS
 from potto.integrate.rules.intervals import Interval, enclosure
@@ -42,8 +41,9 @@ BEYOND = 0.125  # how far beyond its range a turning place is looked for, which 
 
 
 def critical_rows(
-    level: LevelPlan, env: dict[str, Value], lo: Cell, hi: Cell, near: Ranges, batch: int, machine: Any
-) -> list[Row]:
+    systems: Sequence[Critical], variable: str, env: dict[str, Value], lo: Cell, hi: Cell, near: Ranges, batch: int,
+    machine: Any,
+) -> list[Row]:  # fmt: skip
     """The cuts of one variable at places where what lies further in meets, appears, merges or turns.
 
     near: of variables whose range is infinite, what matters of it.
@@ -51,16 +51,16 @@ def critical_rows(
     low, high = as_array(np.minimum(lo.v, hi.v), batch), as_array(np.maximum(lo.v, hi.v), batch)
     around = BEYOND * np.where(np.isfinite(high - low), high - low, 0.0)
     rows: list[Row] = []
-    for system in level.level.critical:
+    for system in systems:
         beyond = around if system.turning else 0.0
-        found = _places(system, level.variable, env, low - beyond, high + beyond, near, machine)
+        found = _places(system, variable, env, low - beyond, high + beyond, near, machine)
         if found is None:
-            machine.note(Unsearched(level.variable))
+            machine.note(Unsearched(variable))
             continue
         owner, places, width = found
         t, et = np.zeros((2, machine.directions if system.steps else 0, owner.size))
         if t.size:
-            t, et = _speeds(system, level.variable, env, owner, places, width, machine)
+            t, et = _speeds(system, variable, env, owner, places, width, machine)
         same = SAME * np.where(np.isfinite(high - low), high - low, 1.0)
         rows += _as_rows(system, owner, places[0], width, same, batch, (t, et))
     return rows
