@@ -66,7 +66,7 @@ def _show(outcomes: list[Outcome], files: int, broken: bool, verbose: bool, cons
             console.answer(f"{head}\n    {outcome.value}")
     failed = sum(not outcome.passed for outcome in outcomes)
     count = f"{_count(len(outcomes), 'live expression')} in {_count(files, 'file')}"
-    verdict = f"{failed} failed" if failed else "all hold"
+    verdict = f"{failed} failed" if failed else "all hold" if outcomes or not broken else "none was asked"
     console.answer(f"{count}: {verdict}{', and there are errors' if broken else ''}")
 
 

@@ -229,7 +229,7 @@ def test_live_expressions(potto: Potto) -> None:
     ran = potto("test", "main.po", main=HALF + "#> f(1/3)\n#= 0.334\n")
     assert ran.status == 1 and "main.po:3: f(1/3)" in ran.err and "expected 0.334" in ran.err
     ran = potto("test", "main.po", main="def f(t) (t\n")
-    assert ran.status == 1 and "P0102" in ran.err and "and there are errors" in ran.out
+    assert ran.status == 1 and "P0102" in ran.err and "none was asked, and there are errors" in ran.out
     ran = potto("test", "--json", "main.po", main=HALF + "#> nothing\n#= 1\n")
     assert ran.status == 1 and "not defined" in ran.json["tests"][0]["message"]
 
