@@ -80,8 +80,10 @@ class Plan(Struct, frozen=True, dict=True):
 
     def packed(self) -> bytes:
         """As bytes; those of the outline are made once. Of the integrand with calls carried out they tell whether there
-        is one: it is made in the time in which it is read. Raises TypeError where something in it is no data."""
-        own = {name: getattr(self, name) for name in self.__struct_fields__ if name not in ("outline", "inlined")}
+        is one: it is made in the time in which it is read, and so are its straight terms. Raises TypeError where
+        something in it is no data."""
+        apart = ("outline", "inlined", "straight")
+        own = {name: getattr(self, name) for name in self.__struct_fields__ if name not in apart}
         return packed([self.outline.packed, self.inlined is not None, own])
 
     @property
@@ -200,7 +202,13 @@ def unpacked_plan(data: bytes, inline: Resolve) -> Plan:
     """The plan that bytes were made of. `inline`: see `make`. Raises ValueError where they were not of a plan."""
     whole, carried_out, own = unpacked(data)
     outline: Outline = unpacked(whole)
-    return Plan(outline, inlined=inlined(outline.term, inline) if carried_out else None, **own)
+    body = inlined(outline.term, inline) if carried_out else None
+    return Plan(outline, inlined=body, straight=_straight(outline, body), **own)
+
+
+def _straight(outline: Outline, body: Term | None) -> StraightIntegral | None:
+    """What rules can be proved of, with the integrand that has calls carried out."""
+    return None if body is None else straight(outline.term, body, outline.levels)
 
 
 class _Asked:
@@ -263,7 +271,7 @@ def make(
         tuple((t, v) for t, v in asked.decisions.items() if not isinstance(t, Const)),
         reaches,
         body,
-        None if body is None else straight(term, body, outline.levels),
+        _straight(outline, body),
         _premise(premises),
         confused,
         () if body is None else _degrees(body, outline.levels),

@@ -83,12 +83,12 @@ BODY_EDITS = [
 ]
 OF_TEXTS = {
     "parsed", "head", "chunk_references", "occurring_names", "piece", "piece_diagnostics", "occurring_in_piece",
-    "_group", "_group_diagnostics",
+    "_group", "_group_diagnostics", "_import_texts",
 }  # fmt: skip
 OF_FILES = {
-    "content", "source", "pieces", "groups_of_pieces", "chunks", "layout", "outline", "texts", "syntax_diagnostics",
-    "module_diagnostics", "statements", "used_imports", "unused_imports", "_words_at", "exists", "problem",
-    "diagnostics",
+    "content", "source", "pieces", "groups_of_pieces", "chunks", "import_texts", "layout", "outline", "texts",
+    "syntax_diagnostics", "module_diagnostics", "statements", "used_imports", "unused_imports", "_words_at", "exists",
+    "problem", "diagnostics",
 }  # fmt: skip
 
 
