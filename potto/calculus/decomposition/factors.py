@@ -27,6 +27,7 @@ Scaled = Callable[[Term], Term]
 
 
 def factors(term: Term) -> Iterable[Term]:
+    """The factors; what is divided by stands as one over it, and a condition apart from what it chooses."""
     waiting = [term]
     while waiting:
         item = waiting.pop()

@@ -1,10 +1,10 @@
 """Members of a batch whose cells are alike, by one product rule for all cells of a shape.
 
-Owns `by_shapes`. What `a_priori` does for one member, with orders that are proved, is done here for many
-at once, with orders that are proved for regions of parameters (`proved_shapes`), or that the Legendre coefficients at
-the nodes show to be enough. Nodes move with the ends of their cells (Reynolds' transport theorem), so that the
-tangents of the sums are the derivatives and no boundary term is left. Rounding is kept track of, as everywhere outside
-of integrals, at a few nodes of each cell, spread over it.
+Owns `by_shapes`. What `a_priori` does for one member, with orders that are proved, is done here for many at once, with
+orders that are proved for regions of parameters (`proved_shapes`), or that the Legendre coefficients at the nodes show
+to be enough. Nodes move with the ends of their cells (Reynolds' transport theorem), so that the tangents of the sums
+are the derivatives and no boundary term is left. Rounding is kept track of, as everywhere outside of integrals, at a
+few nodes of each cell, spread over it.
 """
 
 from __future__ import annotations

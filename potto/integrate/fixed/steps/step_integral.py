@@ -135,13 +135,7 @@ class _Reading:
             if found is None or not isinstance(slope, Const) or slope.value == 0:
                 self.sides[surface] = None
             else:
-                cut = (
-                    found.rest
-                    if slope.value == -1
-                    else neg(found.rest)
-                    if slope is ONE
-                    else div(neg(found.rest), slope)
-                )
+                cut = _root(found.rest, slope)
                 row = self.rows.setdefault(cut, BOUNDS + len(self.rows))
                 self.sides[surface] = row, slope.value > 0
         return self.sides[surface]
@@ -195,6 +189,13 @@ class _Reading:
                     todo += [(arg, factor) for arg in children(node)]
         levels, changes = zip(*parts.values(), strict=True)
         return tuple(parts), [add(*rest), *(add(*own) for own in (*levels, *changes))]
+
+
+def _root(rest: Term, slope: Const) -> Term:
+    """Where slope*x + rest is 0, without a division where there need be none."""
+    if slope.value == -1:
+        return rest
+    return neg(rest) if slope is ONE else div(neg(rest), slope)
 
 
 def _others(args: Sequence[Term], part: Term) -> list[Term]:

@@ -107,10 +107,9 @@ def _smooth(
 ) -> tuple[Array, Array]:
     """The limit of derivatives at places that shrink, and how far off it may be, where these are smooth in the step, or
     in its root, as beside a fold: by polynomials through neighbours among them, of which the one counts that changes
-    the least when either end is left out. The limit
-    known before stays where nothing better is found, or another limit, which something nearer by has. One that is no
-    number may come of rounding, which grows towards the parameters: it gives way to one that hardly changes, unless
-    what is at the parameters is another value."""
+    the least when either end is left out. The limit known before stays where nothing better is found, or another
+    limit, which something nearer by has. One that is no number may come of rounding, which grows towards the
+    parameters: it gives way to one that hardly changes, unless what is at the parameters is another value."""
     slopes = np.array([np.where(np.isfinite(et), t, np.nan) for _, _, t, et in found])
     known = np.isfinite(limit)
     # What is guarded cancels: of what is divided by a step rounding leaves eps/step, and of its derivative eps/step^2.
