@@ -14,7 +14,7 @@ from typing import BinaryIO
 
 from potto_lsp import memory
 from potto_lsp.greeting import greet
-from potto_lsp.wire import Outbox, messages
+from potto_lsp.wire import Outbox, arrivals, messages
 
 SWITCH = 0.0002  # seconds; with Python's default of 5 ms, so long would a question wait for a busy thread
 
@@ -53,7 +53,7 @@ def _talk(reader: BinaryIO, writer: BinaryIO) -> int:
 
         from potto_lsp.server import Server
 
-    return Server(chain([first], received), outbox, greeted).run()
+    return Server(chain([first], received), outbox, greeted, arrivals(reader)).run()
 
 
 def take_streams() -> tuple[BinaryIO, BinaryIO]:

@@ -42,12 +42,18 @@ def leave() -> None:
 class Server(StreamServer):
     """One client: the messages that it sends, and where answers go.
 
-    `greeted`: the first message was a greeting, and has been answered.
+    `greeted`: the first message was a greeting, and has been answered. `arrived` says whether bytes wait to be read.
     """
 
-    def __init__(self, messages: Iterable[Any], outbox: Outbox, greeted: bool = False) -> None:
+    def __init__(
+        self,
+        messages: Iterable[Any],
+        outbox: Outbox,
+        greeted: bool = False,
+        arrived: Callable[[], bool] = lambda: False,
+    ) -> None:
         super().__init__()
-        self._messages, self._outbox, self._greeted = messages, outbox, greeted
+        self._messages, self._outbox, self._greeted, self._arrived = messages, outbox, greeted, arrived
         self.protocol.set_writer(outbox)
         self.documents = Documents()
         self.session: ClientSession | None = None
@@ -98,7 +104,7 @@ class Server(StreamServer):
         client = Client(params)
         self.documents.encoding = client.encoding
         self.session = ClientSession(client, self.notify, self.request, self.later)
-        self.worker = Worker(self.session.load, self.session.idle, leave, self._rest)
+        self.worker = Worker(self.session.load, self.session.idle, leave, self._rest, self._arrived)
         self.worker.start()
         if client.process is not None:
             from potto_lsp.parent import watch

@@ -1,7 +1,8 @@
 """Messages on a stream: `Content-Length` and JSON, as in the base protocol.
 
-Owns `messages`, which reads them, `framed`, which makes their bytes, and `Outbox`, which writes them from any thread
-without waiting: if the server stopped reading because a client does not read for a while, both would wait forever.
+Owns `messages`, which reads them, `arrivals`, which says whether bytes wait, `framed`, which makes a message's bytes,
+and `Outbox`, which writes them from any thread without waiting: if the server stopped reading because a client does not
+read for a while, both would wait forever.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ import logging
 import os
 import re
 import select
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from queue import SimpleQueue
 from threading import Lock, Thread
 from typing import Any, BinaryIO
@@ -43,6 +44,16 @@ def _messages(stream: BinaryIO) -> Iterator[Any]:
             yield json.loads(body)
         except (ValueError, RecursionError) as error:
             yield BadMessage(f"{type(error).__name__}: {error}")
+
+
+def arrivals(stream: BinaryIO) -> Callable[[], bool]:
+    """A function that says whether bytes wait at a stream that nobody has read. Where the system can't say it of every
+    stream (Windows), none ever do."""
+    if not hasattr(select, "poll"):
+        return lambda: False
+    door = select.poll()
+    door.register(stream.fileno(), select.POLLIN)
+    return lambda: bool(door.poll(0))
 
 
 def _header(stream: BinaryIO) -> int | None:

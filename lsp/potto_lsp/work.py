@@ -27,6 +27,7 @@ logger = logging.getLogger(__name__)
 LONG = 0.05  # seconds after which an edit interrupts even a quick question
 REST = 1.0  # seconds without anything to do after which there is time for more
 YIELDING = ("diagnosis", "slow", "idle")  # jobs that give way to what comes
+TICK = 0.004  # seconds between two decisions of the scheduler, by most kernels, on a processor that is never idle
 PATIENCE = 8  # how often a job gives way to questions; after that it is finished first, or it might never be
 
 _claims = Lock()
@@ -62,6 +63,7 @@ class Worker:
 
     `idle` gives the steps of idle work, and a None after those that slow questions wait for. `dead` is called if the
     thread cannot start, `rest` when there has been nothing to do for a while, and again as long as it says so.
+    `arrived` says whether a message has come that nobody has read.
     """
 
     def __init__(
@@ -70,8 +72,9 @@ class Worker:
         idle: Callable[[], Iterator[Callable[[], None] | None]],
         dead: Callable[[], None] = lambda: None,
         rest: Callable[[], bool] = lambda: False,
+        arrived: Callable[[], bool] = lambda: False,
     ) -> None:
-        self._start, self._idle, self._dead, self._rest = start, idle, dead, rest
+        self._start, self._idle, self._dead, self._rest, self._arrived = start, idle, dead, rest, arrived
         self._db: Database | None = None
         self._inbox: SimpleQueue[Job | None] = SimpleQueue()
         self._quick: deque[Job] = deque()
@@ -110,6 +113,7 @@ class Worker:
     def _work(self) -> None:
         try:
             self._db = self._start()
+            self._db.look_around = self._look_around
         except BaseException:
             logger.critical("the analysis cannot start", exc_info=True)
             self._dead()
@@ -187,6 +191,16 @@ class Worker:
             logger.error("a job failed", exc_info=True)
         finally:
             self._running = None
+
+    def _look_around(self) -> None:
+        """Leave the processor to the thread that reads, if a message has arrived and the running job gives way. Both
+        may have the same one, where a thread that wakes waits for the next tick as long as the other has work."""
+        job = self._running
+        if job is None or job.kind not in YIELDING or not self._arrived():
+            return
+        until = time.monotonic() + TICK
+        while self._inbox.empty() and time.monotonic() < until:
+            time.sleep(TICK / 40)
 
     def _give_way(self, job: Job) -> None:
         """Come back to a job after everything more urgent; to idle work only if no edit has started that over."""

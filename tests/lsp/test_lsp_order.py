@@ -3,15 +3,18 @@ both."""
 
 from __future__ import annotations
 
+import os
+import select
 import time
 from collections.abc import Callable, Iterator
-from threading import Event
+from threading import Event, Timer
 from typing import Any
 
 import pytest
 from lsp_client import Client
 from potto_lsp import work
 from potto_lsp.features import FEATURES
+from potto_lsp.wire import arrivals
 from potto_lsp.work import PATIENCE, Job, Worker
 
 from potto.query import Database, query
@@ -136,6 +139,44 @@ def test_a_question_that_comes_between_two_steps_waits_for_neither() -> None:
     world.put("edit", "edit")
     world.worker.start()
     assert world.finished() == ["edit", "step", "hover", "next step"]
+
+
+def test_who_works_lets_a_question_in_that_has_arrived_and_was_not_read() -> None:
+    world = World()
+
+    def arrived() -> bool:
+        """As on one processor: nobody else runs until the thread that works lets them."""
+        if not world.begun.is_set():
+            world.begun.set()
+            Timer(0.001, world.put, ("quick", "hover")).start()
+            return True
+        return False
+
+    def step() -> None:
+        world.done.append("step")
+        for number in range(64):
+            tick(world.db, len(world.done) * 64 + number)
+        world.done.append("end")
+
+    def steps() -> Iterator[Callable[[], None] | None]:
+        yield step
+        yield world.rested.set
+
+    world.worker = Worker(lambda: world.db, steps, arrived=arrived)
+    world.put("edit", "edit")
+    world.worker.start()
+    assert world.finished() == ["edit", "step", "hover", "step", "end"]
+
+
+def test_bytes_that_nobody_has_read_are_seen() -> None:
+    end, other = os.pipe()
+    with os.fdopen(end, "rb", buffering=0) as stream, os.fdopen(other, "wb", buffering=0) as client:
+        arrived = arrivals(stream)
+        assert not arrived()
+        client.write(b"Content-Length")
+        assert arrived() == hasattr(select, "poll")
+        stream.read(14)
+        assert not arrived()
 
 
 def test_idle_work_that_fails_leaves_questions_answered() -> None:
