@@ -28,6 +28,7 @@ LONG = 0.05  # seconds after which an edit interrupts even a quick question
 REST = 1.0  # seconds without anything to do after which there is time for more
 YIELDING = ("diagnosis", "slow", "idle")  # jobs that give way to what comes
 TICK = 0.004  # seconds between two decisions of the scheduler, by most kernels, on a processor that is never idle
+LOOK = 8  # queries between two looks around: with 0.1 ms for one, about a millisecond
 PATIENCE = 8  # how often a job gives way to questions; after that it is finished first, or it might never be
 
 _claims = Lock()
@@ -84,6 +85,7 @@ class Worker:
         self._urgent = False  # whether slow questions wait for the next step
         self._running: Job | None = None
         self._since = 0.0
+        self._looked = 0  # queries since the last look around
         self._thread = Thread(target=self._work, name="potto-analysis", daemon=True)
 
     def start(self) -> None:
@@ -195,8 +197,9 @@ class Worker:
     def _look_around(self) -> None:
         """Leave the processor to the thread that reads, if a message has arrived and the running job gives way. Both
         may have the same one, where a thread that wakes waits for the next tick as long as the other has work."""
+        self._looked = (self._looked + 1) % LOOK
         job = self._running
-        if job is None or job.kind not in YIELDING or not self._arrived():
+        if self._looked or job is None or job.kind not in YIELDING or not self._arrived():
             return
         until = time.monotonic() + TICK
         while self._inbox.empty() and time.monotonic() < until:

@@ -39,7 +39,6 @@ RESTING: Final = 32  # revisions before `Below` is worked out again for other le
 LOGGED: Final = 16  # revisions for which the changes are kept
 LEAVES_FIRST: Final = 8  # that are run early on the way to one memo; after that it is walked
 ONCE: Final = Below((), -FOREVER, frozenset())  # of a memo that was verified once: it may never be again
-LOOK: Final = 8  # queries between two looks around: with 0.1 ms for one, about a millisecond
 SEGMENT: Final = 40  # levels of running queries on one thread: with 20 frames each, still below Python's limit
 
 
@@ -56,8 +55,7 @@ class Engine:
         self._lock = threading.Lock()
         self._owner = 0  # the thread that evaluates or writes
         self._evaluation, self._cancelled = 1, 0  # the numbers of the present evaluation and of the one to cancel
-        self.look_around: Callable[[], None] | None = None  # called now and then by the thread that runs queries
-        self._looked = 0  # queries run since
+        self.look_around: Callable[[], None] = lambda: None  # called before each query that runs
         self._frame: dict[Node, None] | None = None  # what the running query has read
         self._running: list[Memo] = []
         self._floor = 0  # the lowest place among these that a cycle may reach
@@ -284,23 +282,18 @@ class Engine:
 
     def _run(self, memo: Memo) -> None:
         """Run a query and keep its answer."""
-        self._looked += 1
-        if self._looked >= LOOK:
-            self._looked = 0
-            if self.look_around is not None:
-                self.look_around()
+        self.look_around()
         if self._cancelled == self._evaluation:
             raise Cancelled
         index, caller, mark = len(self._running), self._frame, len(self._provisional)
         frame: dict[Node, None] = {}
-        fresh, before = memo.value is GONE and memo.verified_at < 0, memo.kept()
+        fresh, before, changed_at = memo.value is GONE and memo.verified_at < 0, memo.kept(), memo.changed_at
         memo.break_ring()
         memo.index, memo.low, memo.cyclic = index, index, False
         self._running.append(memo)
         self._frame = frame
         if self._logs:
             self._log("executed", memo.query.name, memo.args)
-        changed_at = memo.changed_at
         try:
             memo.put(self._answer(memo), self.revision, self._changes[self.revision])
             if not fresh and memo.changed_at == changed_at:
