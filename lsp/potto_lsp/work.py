@@ -28,6 +28,7 @@ LONG = 0.05  # seconds after which an edit interrupts even a quick question
 REST = 1.0  # seconds without anything to do after which there is time for more
 YIELDING = ("diagnosis", "slow", "idle")  # jobs that give way to what comes
 TICK = 0.004  # seconds between two decisions of the scheduler, by most kernels, on a processor that is never idle
+NOD = 0.0001  # seconds in which another thread on this processor begins to run
 LOOK = 8  # queries between two looks around: with 0.1 ms for one, about a millisecond
 PATIENCE = 8  # how often a job gives way to questions; after that it is finished first, or it might never be
 
@@ -193,6 +194,8 @@ class Worker:
             logger.error("a job failed", exc_info=True)
         finally:
             self._running = None
+        if job.kind == "quick" and not self._quick and self._inbox.empty():
+            time.sleep(NOD)  # whoever is answered may be on this processor, and would wait for it as well
 
     def _look_around(self) -> None:
         """Leave the processor to the thread that reads, if a message has arrived and the running job gives way. Both
@@ -203,7 +206,7 @@ class Worker:
             return
         until = time.monotonic() + TICK
         while self._inbox.empty() and time.monotonic() < until:
-            time.sleep(TICK / 40)
+            time.sleep(NOD)
 
     def _give_way(self, job: Job) -> None:
         """Come back to a job after everything more urgent; to idle work only if no edit has started that over."""
