@@ -1,4 +1,4 @@
-"""Starting the server on standard streams or on a socket.
+"""Starting the server on standard streams, on a socket or on a WebSocket.
 
 Owns the streams. Once the server has taken standard output, whatever else is printed goes to standard error: one stray
 `print` would break the conversation.
@@ -9,8 +9,9 @@ from __future__ import annotations
 import logging
 import os
 import sys
+from collections.abc import Callable, Iterator, Sequence
 from itertools import chain
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 from potto_lsp import memory
 from potto_lsp.greeting import greet
@@ -21,9 +22,22 @@ SWITCH = 0.0002  # seconds; with Python's default of 5 ms, so long would a quest
 
 def serve(address: tuple[str, int] | None = None, log: str | None = None) -> int:
     """Serve one client, on standard streams or as a server on an address; the exit status."""
+    _begin(log)
+    return _serve_streams() if address is None else _serve_socket(address)
+
+
+def serve_websocket(address: tuple[str, int], origins: Sequence[str], log: str | None = None) -> int:
+    """Serve one client on a WebSocket; the exit status. `origins` are of web pages that may be it. Raises `ImportError`
+    without the library websockets."""
+    from potto_lsp import websocket
+
+    _begin(log)
+    return _leave(websocket.serve(address, origins, _converse))
+
+
+def _begin(log: str | None) -> None:
     _log_to(log)
     sys.setswitchinterval(SWITCH)
-    return _serve_streams() if address is None else _serve_socket(address)
 
 
 def _log_to(path: str | None) -> None:
@@ -41,9 +55,12 @@ def _serve_streams() -> int:
 
 
 def _talk(reader: BinaryIO, writer: BinaryIO) -> int:
-    """Serve the client at a pair of streams and return the exit status. The greeting is answered before the server is
-    loaded."""
-    received, outbox = messages(reader), Outbox(writer)
+    """Serve the client at a pair of streams and return the exit status."""
+    return _converse(messages(reader), Outbox(writer), arrivals(reader))
+
+
+def _converse(received: Iterator[Any], outbox: Outbox, arrived: Callable[[], bool] = lambda: False) -> int:
+    """Serve a client and return the exit status. The greeting is answered before the server is loaded."""
     first = next(received, None)
     if first is None:
         outbox.close()
@@ -53,7 +70,7 @@ def _talk(reader: BinaryIO, writer: BinaryIO) -> int:
 
         from potto_lsp.server import Server
 
-    return Server(chain([first], received), outbox, greeted, arrivals(reader)).run()
+    return Server(chain([first], received), outbox, greeted, arrived).run()
 
 
 def take_streams() -> tuple[BinaryIO, BinaryIO]:

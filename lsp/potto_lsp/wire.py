@@ -1,8 +1,8 @@
 """Messages on a stream: `Content-Length` and JSON, as in the base protocol.
 
-Owns `messages`, which reads them, `arrivals`, which says whether bytes wait, `framed`, which makes a message's bytes,
-and `Outbox`, which writes them from any thread without waiting: if the server stopped reading because a client does not
-read for a while, both would wait forever.
+Owns `messages`, which reads them, `parsed`, which reads the body of one, `arrivals`, which says whether bytes wait,
+`framed`, which makes a message's bytes, and `Outbox`, which writes them from any thread without waiting: if the server
+stopped reading because a client does not read for a while, both would wait forever.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import select
 from collections.abc import Callable, Iterable, Iterator
 from queue import SimpleQueue
 from threading import Lock, Thread
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, Protocol
 
 logger = logging.getLogger(__name__)
 MOST_BYTES = 256_000_000  # of one message; a header that says more is broken
@@ -40,10 +40,15 @@ def _messages(stream: BinaryIO) -> Iterator[Any]:
         if len(body) < length:
             logger.error("the stream ended inside of a message")
             return
-        try:
-            yield json.loads(body)
-        except (ValueError, RecursionError) as error:
-            yield BadMessage(f"{type(error).__name__}: {error}")
+        yield parsed(body)
+
+
+def parsed(body: bytes | str) -> Any:
+    """The message that a body is; a `BadMessage` if it is not JSON."""
+    try:
+        return json.loads(body)
+    except (ValueError, RecursionError) as error:
+        return BadMessage(f"{type(error).__name__}: {error}")
 
 
 def arrivals(stream: BinaryIO) -> Callable[[], bool]:
@@ -124,6 +129,16 @@ def _framed_list(message: dict[str, Any], pieces: list[bytes]) -> bytes:
     return b",".join(whole)
 
 
+class Sink(Protocol):
+    """Where bytes go, a whole message at a time. `fileno` raises `OSError` if nothing may be written past it."""
+
+    def fileno(self) -> int: ...
+
+    def write(self, message: bytes, /) -> object: ...
+
+    def flush(self) -> None: ...
+
+
 class Outbox:
     """Writes messages in order.
 
@@ -131,7 +146,7 @@ class Outbox:
     message took a third as long as producing the messages: both need the interpreter.)
     """
 
-    def __init__(self, stream: BinaryIO) -> None:
+    def __init__(self, stream: Sink) -> None:
         self._stream, self._pipe = stream, _pipe_of(stream)
         self._queue: SimpleQueue[bytes | None] = SimpleQueue()
         self._lock = Lock()
@@ -191,7 +206,7 @@ class _Pipe:
         return bytes(rest)
 
 
-def _pipe_of(stream: BinaryIO) -> _Pipe | None:
+def _pipe_of(stream: Sink) -> _Pipe | None:
     """A stream as a pipe, if it is one and the system can say of one when it is ready."""
     try:
         return _Pipe(stream.fileno()) if hasattr(select, "poll") else None
