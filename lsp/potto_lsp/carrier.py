@@ -5,6 +5,8 @@ their cancellation, requests and notifications to the client, the codes of error
 
 - `io_.run` knows `Content-Length: n` in exactly that form, answers nothing to what is not JSON and takes a body that
   ends early for a message: `StreamServer.carry` is given what `wire.messages` reads.
+- `start_tcp` and `start_ws` put all clients into one conversation, and `start_ws` lets any web page in: `main` takes
+  one client, `websocket` looks at origins.
 - Importing it takes as long as checking a hundred definitions: see `lazy_types` and `later`.
 - `structure_message` is called for every object inside of a message, and makes classes that are taken apart again:
   messages stay plain JSON here.

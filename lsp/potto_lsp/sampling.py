@@ -13,13 +13,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from potto.diagnostics import PottoError
-from potto.modules import find_module, resolve_module
 from potto.projects.settings import settings
 from potto.python.api import Module, expression
 from potto.python.functions import Function
 from potto.python.gradients import grad
 from potto.runtime.answers.estimate import Estimate
-from potto.syntax import nodes
 
 if TYPE_CHECKING:
     from potto.evaluating.world import World
@@ -125,21 +123,11 @@ def _meant(module: Module, name: str, text: str) -> Any:
     if not text.strip():
         raise NoSamples(f"`{name}` needs a value")
     try:
-        found = expression(*_home(module, text))
+        file, there = module._world.home(module._file, text)
+        found = expression(Module(module._world, file), there)
     except PottoError as error:
         raise NoSamples(f"`{name}`: " + "; ".join(d.message for d in error.diagnostics)) from None
     return found.value if isinstance(found, Estimate) else found
-
-
-def _home(module: Module, text: str) -> tuple[Module, str]:
-    """The module in whose names a text is to be read, and the expression to read there."""
-    written = module._world.parse(text)
-    if isinstance(written, nodes.Member):
-        db, file = module._world.db, module._file
-        other = find_module(db, file, written.path)
-        if other is not None and resolve_module(db, file, written.path) is None:
-            return Module(module._world, other), written.name
-    return module, text
 
 
 def _numbers(name: str, value: Any, error: Any, shape: tuple[int, ...]) -> dict[str, list[str]]:

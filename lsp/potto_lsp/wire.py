@@ -129,7 +129,7 @@ def _framed_list(message: dict[str, Any], pieces: list[bytes]) -> bytes:
     return b",".join(whole)
 
 
-class Sink(Protocol):
+class MessageStream(Protocol):
     """Where bytes go, a whole message at a time. `fileno` raises `OSError` if nothing may be written past it."""
 
     def fileno(self) -> int: ...
@@ -146,7 +146,7 @@ class Outbox:
     message took a third as long as producing the messages: both need the interpreter.)
     """
 
-    def __init__(self, stream: Sink) -> None:
+    def __init__(self, stream: MessageStream) -> None:
         self._stream, self._pipe = stream, _pipe_of(stream)
         self._queue: SimpleQueue[bytes | None] = SimpleQueue()
         self._lock = Lock()
@@ -206,7 +206,7 @@ class _Pipe:
         return bytes(rest)
 
 
-def _pipe_of(stream: Sink) -> _Pipe | None:
+def _pipe_of(stream: MessageStream) -> _Pipe | None:
     """A stream as a pipe, if it is one and the system can say of one when it is ready."""
     try:
         return _Pipe(stream.fileno()) if hasattr(select, "poll") else None

@@ -39,7 +39,7 @@ class Answers:
         wrt: str | None = None,
     ) -> None:  # fmt: skip
         self.world, self.file, self.name, self.given, self.wrt = world, file, name, dict(given or {}), wrt
-        self._scenes: dict[str, IntegralScene] = {}
+        self._scenes: dict[tuple[str, frozenset[tuple[str, str]]], IntegralScene] = {}
         self._revision = -1
 
     def answer(self, path: str, asked: Mapping[str, Any]) -> dict[str, Any] | None:
@@ -54,7 +54,7 @@ class Answers:
                     names = [scene.name for scene in scenes(self.world.db, self.file, drawable=False)]
                     return {"names": names, "chosen": self.name or (names[0] if names else "")}
                 case "/open":
-                    return self._open(str(asked["name"]))
+                    return self._open(asked)
                 case "/formulas":
                     return {"formulas": self._formulas(str(asked["name"]))}
                 case "/look":
@@ -65,19 +65,26 @@ class Answers:
             return {"error": "the question is not one of this page"}
         return None
 
-    def _scene(self, name: str) -> IntegralScene:
-        if name not in self._scenes:
-            given = self.given if name == self.name else {}
-            self._scenes[name] = IntegralScene(self.world, self.file, name, given)
+    def _scene(self, asked: Mapping[str, Any]) -> IntegralScene:
+        """What is asked for: a function, and what its parameters that are functions are given, where that is chosen."""
+        name = str(asked["name"])
+        functions = {str(each): str(text) for each, text in (asked.get("functions") or {}).items()}
+        key = name, frozenset(functions.items())
+        if key not in self._scenes:
+            given = {**(self.given if name == self.name else {}), **functions}
+            made = self._scenes[key] = IntegralScene(self.world, self.file, name, given)
+            self._scenes[name, frozenset(made.functions.items())] = made
             self._revision = self.world.db.revision
-        return self._scenes[name]
+        return self._scenes[key]
 
-    def _open(self, name: str) -> dict[str, Any]:
+    def _open(self, asked: Mapping[str, Any]) -> dict[str, Any]:
         """What there is to choose, and the text with its conditions."""
-        found = self._scene(name)
+        found = self._scene(asked)
         wrt = self.wrt if self.wrt in found.parameters else found.moving
-        count = len(found.regions(wrt))
-        return {"values": found.values, "wrt": wrt, "indices": found.indices, "integrals": count, **self._text(name)}
+        return {
+            "values": found.values, "wrt": wrt, "indices": found.indices, "integrals": len(found.regions(wrt)),
+            "functions": found.functions, "fits": found.fits, **self._text(found.name),
+        }  # fmt: skip
 
     def _formulas(self, name: str) -> list[dict[str, str]]:
         found = derivative_text(self.world.db, self.file, name)
@@ -103,7 +110,7 @@ class Answers:
         return {"source": text, "conditions": marks}
 
     def _look(self, asked: Mapping[str, Any]) -> dict[str, Any]:
-        found = self._scene(str(asked["name"]))
+        found = self._scene(asked)
         values = {name: float(asked["values"][name]) for name in found.values}
         wrt, which = str(asked["wrt"]), int(asked["which"])
         ghost = float(asked.get("ghost") or 0.0) or None  # a step of 0 shows no difference

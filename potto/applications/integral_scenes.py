@@ -57,6 +57,7 @@ class IntegralScene:
     given: texts for parameters; the others start as a live expression gives them. `values` has the numbers by name, a
     tuple's as `p_1`, `p_2`, a record's as `p.field`, and those of indices of sums and arrays around integrals: what is
     seen is one summand, the first if nobody says which. `parameters`: the names of those that can move.
+    `functions`: the texts that stand for parameters that are functions; `fits`: what else is offered for each.
     """
 
     def __init__(self, world: World, file: str, name: str, given: Mapping[str, str]) -> None:
@@ -70,6 +71,8 @@ class IntegralScene:
             raise wrong_call(f"`{name}` is not a function of numbers", "name a function whose parameters are numbers, "
                              "tuples of them, or functions of them")  # fmt: skip
         self.values: dict[str, float] = {}
+        self.functions: dict[str, str] = {}
+        self.fits = {p.name: p.fits for p in found.parameters if p.kind == "function"}
         self._parts: dict[str, str] = {}  # what the program calls the numbers of a tuple or a record
         arguments = iter(self._arguments(found, given))
         call = core(world.db, target.file, target.name).term
@@ -101,10 +104,12 @@ class IntegralScene:
             if parameter.kind == "function":
                 text = said or next((text for text in parameter.fits if self._stands(text)), "")
                 if not text:
-                    raise wrong_call(f"`{parameter.name}` is a function, {parameter.type}", "give it one: "
-                                     f"`{parameter.name}=\\(x) . x`")  # fmt: skip
-                tree, _ = self.world.typed(self.file, text)
-                terms.append(elaborate_expression(self.world.db, self.file, tree).term)
+                    raise wrong_call(f"`{parameter.name}` is a function, {parameter.type}",
+                                     "nothing here fits it, so give it one")  # fmt: skip
+                self.functions[parameter.name] = text
+                home, there = self.world.home(self.file, text)
+                tree, _ = self.world.typed(home, there)
+                terms.append(elaborate_expression(self.world.db, home, tree).term)
                 continue
             numbers = self._given(said, parameter.size) if said else self._usual(parameter)
             names = [parameter.name, *(f"{parameter.name}.{field}" for field in parameter.fields)]
@@ -125,9 +130,9 @@ class IntegralScene:
         return parameter.value or (UNSAID,) * parameter.size
 
     def _stands(self, text: str) -> bool:
-        """Whether an expression means something in the file: an offer may need an import that is not there yet."""
+        """Whether an expression means something: what is offered may have errors."""
         try:
-            self.world.typed(self.file, text)
+            self.world.typed(*self.world.home(self.file, text))
         except PottoError:
             return False
         return True
@@ -194,7 +199,8 @@ class IntegralScene:
             self._told[key] = time.perf_counter()
             if quick:
                 self._took[key] = self._told[key] - start
-        title = f"{self.name}({', '.join(f'{name} = {value:.4g}' for name, value in values.items())})"
+        given = {name: f"{value:.4g}" for name, value in values.items()} | self.functions
+        title = f"{self.name}({', '.join(f'{name} = {text}' for name, text in given.items())})"
         return Shot(seen, found, title, wrt, standing)
 
     def _compiled(self, term: Lam) -> TermFunction:

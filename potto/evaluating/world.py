@@ -23,7 +23,7 @@ from potto.diagnostics import Diagnostic, PottoError, Related
 from potto.elaborate import core, elaborate_expression
 from potto.evaluating.answering import EXPRESSION, Answer, Checked, estimate_of, remarked
 from potto.kernels.cells import Value
-from potto.modules import chunk_start
+from potto.modules import chunk_start, find_module, names, resolve_module
 from potto.projects.settings import Settings, current
 from potto.reports.render import Located, ProgramError
 from potto.runtime.answers.records import has_records, named_answer
@@ -31,7 +31,7 @@ from potto.runtime.evaluate import Program
 from potto.runtime.script import Script, Shown, placed
 from potto.source import SourceText, Span
 from potto.syntax import parse_expression
-from potto.syntax.nodes import Expr
+from potto.syntax.nodes import Expr, Member
 from potto.types import format_type, infer_expression, interface
 from potto.types.kinds import NO_TANGENT
 from potto.types.types import Type
@@ -211,6 +211,17 @@ class World(Library):
         inferred = infer_expression(self.db, file, tree)
         self._stop(inferred.diagnostics, self.sources(text))
         return tree, inferred.type
+
+    def home(self, file: str, text: str) -> tuple[str, str]:
+        """In which file's names the text of an argument is read, and what is read there: `m.f` is also a function of a
+        module that the file does not import, as it is offered. Raises ProgramError."""
+        written = self.parse(text)
+        if isinstance(written, Member):
+            other = find_module(self.db, file, written.path)
+            known = resolve_module(self.db, file, written.path) is not None
+            if other is not None and not known and written.name in names(self.db, other):
+                return other, written.name
+        return file, text
 
     def parse(self, text: str) -> Expr:
         """The tree of an expression. Raises ProgramError."""

@@ -93,6 +93,20 @@ try {
   await page.waitForFunction(() => !busy && !newest && !dragged);
   seen.innerThen = [await index("j").inputValue(), await index("j").getAttribute("min")];
   seen.summand = await numbers();
+  // A function is given another one.
+  await page.locator("#name").selectOption("seen");
+  const shade = page.locator('input.function[data-parameter="shade"]');
+  await shade.waitFor();
+  await settled();
+  seen.shade = await shade.inputValue();
+  seen.shaded = await numbers();
+  await shade.fill("\\(x) . 3");
+  await shade.press("Enter");
+  await page.locator("#now figcaption", { hasText: ". 3" }).waitFor();
+  await settled();
+  seen.reshaded = await numbers();
+  seen.caption = await page.locator("#now figcaption").innerText();
+  await page.screenshot({ path: join(folder, "view-function.png"), fullPage: true });
   await page.locator("#name").selectOption("plain");
   await page.locator("#said", { hasText: "no integral" }).waitFor();
   seen.beyond = beyond;

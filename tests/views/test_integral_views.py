@@ -118,6 +118,7 @@ def test_of_three_variables_a_section_is_seen() -> None:
 
 def test_a_parameter_that_is_a_function_is_written_in() -> None:
     shot = looked("shaded", "c", shader=r"\(x, y) . x", c=-0.7)
+    assert shot.title == r"shaded(c = -0.7, shader = \(x, y) . x)"
     (surface,) = shot.view.surfaces
     # the edge y = 0.7 - x runs over x from 0 to 0.7: the integral of x dx along it
     assert surface.gain == pytest.approx(0.245, abs=1e-3)

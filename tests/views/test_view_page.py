@@ -29,6 +29,9 @@ def disc(r) integral ([-1, 1], [-1, 1]) [x^2 + y^2 < r^2] d(x, y)
 #> disc(0.7)
 def nested(t) sum i in 2..3 (sum j in i..5 (integral [0, 1] [x < t/(i*j)] d(x)))
 def plain(t) t
+def seen(c, shade) integral [0, 1] [x < c]*shade(x) d(x)
+#> seen(0.5, ramp)
+def ramp(x: Real*) -> Real x
 """
 MESH = """
 def edge(a: (Real*, Real*), b: (Real*, Real*), x, y) (b.x - a.x)*(y - a.y) - (b.y - a.y)*(x - a.x)
@@ -64,7 +67,7 @@ def asked(address: str, path: str, body: Any, host: str = "") -> Any:
 
 
 def test_a_slider_moves_the_numbers(address: str) -> None:
-    assert asked(address, "/names", {}) == {"names": ["f", "disc", "nested", "plain"], "chosen": "f"}
+    assert asked(address, "/names", {}) == {"names": ["f", "disc", "nested", "plain", "seen", "ramp"], "chosen": "f"}
     found = asked(address, "/open", {"name": "f"})
     assert (found["values"], found["wrt"], found["integrals"]) == ({"t": 0.25}, "t", 1)
     for t, e_to_t in ((0.25, 1.2840254166877414), (0.75, 2.117000016612675)):
@@ -110,6 +113,22 @@ def test_also_where_a_part_or_a_variable_has_another_name_in_the_picture() -> No
     seen = answers.answer("/look", {"name": "slant", "values": values, "wrt": "w_1", "which": 0}) or {}
     (surface,) = seen["surfaces"]
     assert surface["equation"] != mark["equation"] == surface["condition"]
+
+
+def test_a_function_is_chosen_from_the_whole_workspace_or_written(tmp_path: Path) -> None:
+    """Shaders over [0, c]: x, of a module that is not imported, leads to c^2/2, and 3 to 3*c."""
+    (tmp_path / "scene.po").write_text("def seen(c, shade) integral [0, 1] [x < c]*shade(x) d(x)\n")
+    (tmp_path / "shades.po").write_text("def ramp(x: Real*) -> Real x\n")
+    world = World([tmp_path])
+    answers = Answers(world, world.key(tmp_path / "scene.po"))
+    found = answers.answer("/open", {"name": "seen"}) or {}
+    assert found["functions"] == {"shade": "shades.ramp"} and "shades.ramp" in found["fits"]["shade"]
+    question = {"name": "seen", "values": {"c": 0.5}, "wrt": "c", "which": 0}
+    for functions, value in (({}, 0.125), ({"shade": "shades.ramp"}, 0.125), ({"shade": r"\(x) . 3"}, 1.5)):
+        seen = answers.answer("/look", {**question, "functions": functions}) or {}
+        assert seen["numbers"]["value"] == pytest.approx(value, abs=1e-14), functions
+    wrong = answers.answer("/open", {"name": "seen", "functions": {"shade": "shades.none"}}) or {}
+    assert "shades.none" in wrong["error"]
 
 
 def test_ghosts_are_a_step_away_and_nodes_are_where_it_was_evaluated(address: str) -> None:
@@ -176,3 +195,6 @@ def test_a_person_with_a_browser(address: str, tmp_path: Path) -> None:
     assert seen["ground"] == "rgb(30, 30, 30)"
     assert seen["inner"] == ["2", "2"] and seen["innerThen"] == ["3", "3"]
     assert float(seen["summand"][1].split()[0]) == pytest.approx(1 / 9, rel=1e-9)  # of t/(i*j) by t, with i = j = 3
+    assert seen["shade"] == "ramp" and float(seen["shaded"][0].split()[0]) == pytest.approx(0.125, rel=1e-9)
+    assert float(seen["reshaded"][0].split()[0]) == pytest.approx(1.5, rel=1e-9)  # of 3 from 0 to 0.5
+    assert "shade = \\(x) . 3" in seen["caption"]

@@ -19,7 +19,7 @@ async function ask(path, body) {
   return new Promise((resolve) => waiting.set(id, resolve));
 }
 
-let state = { name: "", values: {}, indices: {}, wrt: "", which: 0, integrals: 1 };
+let state = { name: "", values: {}, functions: {}, fits: {}, indices: {}, wrt: "", which: 0, integrals: 1 };
 let lit = "";
 let last = null; // the newest answer
 let pinned = null;
@@ -46,8 +46,8 @@ async function look() {
   const quick = dragged;
   const opening = begun;
   const since = performance.now();
-  const { name, values, wrt, which } = state;
-  const body = { name, values: { ...values }, wrt, which, dark: dark(), nodes: $("nodes").checked };
+  const { name, values, functions, wrt, which } = state;
+  const body = { name, values: { ...values }, functions, wrt, which, dark: dark(), nodes: $("nodes").checked };
   if ($("ghost").checked) body.ghost = Math.max(1e-9, +$("step").value * Math.max(1, Math.abs(values[wrt] ?? 0)));
   try {
     const found = await ask("/look", { ...body, quick });
@@ -55,7 +55,7 @@ async function look() {
       say(found.error ?? "");
       if (!found.error) {
         const kept = !found.numbers && last?.body.name === name && last.wrt === wrt && last.body.which === which;
-        last = { ...found, ...(kept && { told: last.told, numbers: last.numbers, old: true }), title: titleOf(name, body.values), wrt, body };
+        last = { ...found, ...(kept && { told: last.told, numbers: last.numbers, old: true }), title: titleOf(name, { ...body.values, ...functions }), wrt, body };
         show($("now"), last, pinned);
         stand(found.indices, body.values);
         tell(found, performance.now() - since);
@@ -87,7 +87,7 @@ function showPinned(shot) {
 }
 
 const titleOf = (name, values) =>
-  `${name}(${Object.entries(values).map(([n, v]) => `${n} = ${+v.toPrecision(5)}`).join(", ")})`;
+  `${name}(${Object.entries(values).map(([n, v]) => `${n} = ${v.toPrecision ? +v.toPrecision(5) : v}`).join(", ")})`;
 const say = (text) => { $("said").textContent = text; };
 function tell(found, whole) {
   const time = $("time");
@@ -153,16 +153,16 @@ $("shots").addEventListener("click", (event) => {
 const fill = (select, names, selected) =>
   select.replaceChildren(...names.map(([value, text]) => new Option(text, value, false, String(value) === String(selected))));
 
-async function open(name, keep = false, which = 0) {
+async function open(name, keep = false, which = 0, functions = keep && name === state.name ? state.functions : {}) {
   const opening = ++begun;
-  const found = await ask("/open", { name });
+  const found = await ask("/open", { name, functions });
   if (opening !== begun) return;
   say(found.error ?? "");
   if (found.error) { if (!keep) $("now").replaceChildren(); return; }
   const same = keep && name === state.name && Object.keys(found.values).join() === Object.keys(state.values).join();
   state = {
     name, integrals: found.integrals, which: Math.min(same ? state.which : which, found.integrals - 1),
-    values: same ? state.values : found.values, indices: found.indices, wrt: same ? state.wrt : found.wrt,
+    values: same ? state.values : found.values, functions: found.functions, fits: found.fits, indices: found.indices, wrt: same ? state.wrt : found.wrt,
   };
   $("name").value = name;
   fill($("wrt"), Object.keys(state.values).filter((n) => !(n in state.indices)).map((n) => [n, n]), state.wrt);
@@ -193,7 +193,16 @@ function sliders() {
     const label = make("label", {}, make("span", { className: "name", textContent: name }), slider, told);
     label.dataset.name = name;
     return label;
-  }));
+  }), ...Object.entries(state.functions).map(([name, text]) => offers(name, text)));
+}
+/** A parameter that is a function is given one that fits, or any expression. */
+function offers(name, text) {
+  const list = make("datalist", { id: `fits-${name}` }, ...state.fits[name].map((fit) => new Option("", fit)));
+  const field = make("input", { className: "function", value: text, spellcheck: false, ariaLabel: name });
+  field.setAttribute("list", list.id);
+  field.dataset.parameter = name;
+  field.onchange = () => void open(state.name, true, 0, { ...state.functions, [name]: field.value });
+  return make("label", {}, make("span", { className: "name", textContent: name }), field, list);
 }
 /** Indices stand on their numbers, which other values may have changed; but for one that was dragged on meanwhile. */
 function stand(indices, asked) {
