@@ -15,6 +15,7 @@ from potto.calculus.differentiation.boundary_terms import jumps
 from potto.calculus.differentiation.dual import Differentiator
 from potto.calculus.explanation.explain import equation
 from potto.calculus.explanation.plain_names import apart, plainly_named
+from potto.calculus.solving.pivots import Roots
 from potto.checking.written_out import carried_out
 from potto.core.simplify import simplify
 from potto.core.terms import (
@@ -94,7 +95,7 @@ def regions(db: Database, term: Term, wrt: str) -> tuple[DrawnIntegral, ...]:
     out. Raises PottoError where an integrand has no derivative in symbols.
     """
     params, found, around = _outermost(db, term)
-    work = Differentiator(lambda g: core(db, g.module, g.name).term, folding=True)
+    work = Differentiator(lambda g: core(db, g.module, g.name).term, wanted=Roots.ALL)
     names = (*params, *(index.name for index in around))
     return tuple(_region(part, names, work, wrt) for node in found for part in _numbers(node))
 

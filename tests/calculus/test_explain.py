@@ -172,7 +172,7 @@ def test_roots_are_named_where_they_exist() -> None:
     found = explain("def f(r, d) integral (a ~ uniform(0, pi/2)) [abs(a - d) < r]*[cos(a) < d] d(a)", "f")
     (item,) = found.integrals
     roots = [root for surface in item.surfaces for root in surface.roots]
-    periodic = ["a = acos(d) + 2*k*pi for integers k", "a = 2*k*pi - acos(d) for integers k"]
+    periodic = ["a = acos(d) + 2*pi*k for integers k", "a = 2*pi*k - acos(d) for integers k"]
     assert roots == ["a = d - r", "a = r + d", *periodic]
     assert found.conditions == ()
 

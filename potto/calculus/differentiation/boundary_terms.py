@@ -19,7 +19,7 @@ from potto.calculus.algebra.rational_form import is_zero
 from potto.calculus.differentiation.between import between, scaled
 from potto.calculus.differentiation.derivative import partial, total, vanishes, zero_like
 from potto.calculus.solving.pivots import NoClosedForm as NoClosedForm
-from potto.calculus.solving.pivots import SurfaceRoot, chosen, conjunction, pivots
+from potto.calculus.solving.pivots import Roots, SurfaceRoot, chosen, conjunction, pivots
 from potto.calculus.solving.solve import factors
 from potto.calculus.surfaces.branch_assignment import (
     NOWHERE,
@@ -70,9 +70,9 @@ from potto.core.terms import (
 Rate = Callable[[Term], Term]
 
 
-def at_surfaces(node: Integral, moving: frozenset[str], rate: Rate, folding: bool = False) -> list[Term]:
+def at_surfaces(node: Integral, moving: frozenset[str], rate: Rate, wanted: Roots = Roots.STEADY) -> list[Term]:
     """The boundary terms of an integral, one for each root of each surface that moves; over a level set, as an integral
-    of a delta, where roots have no closed form, or one in which they merge, unless `folding` ones are wanted."""
+    of a delta, where roots have no closed form that is `wanted`."""
     branches = branches_of(node.body, node.variables)
     surfaces: dict[Term, list[Branch]] = {}
     for item in branches:
@@ -83,7 +83,7 @@ def at_surfaces(node: Integral, moving: frozenset[str], rate: Rate, folding: boo
     met: list[SurfaceRoot] = []
     for surface, members in surfaces.items():
         try:
-            terms += _at_surface(node, surface, members, branches, met, rate, folding)
+            terms += _at_surface(node, surface, members, branches, met, rate, wanted)
         except NoClosedForm:
             terms += _over_level_set(node, surface, members, rate)
     return [term for term in terms if not vanishes(term)]
@@ -91,7 +91,7 @@ def at_surfaces(node: Integral, moving: frozenset[str], rate: Rate, folding: boo
 
 def _at_surface(
     node: Integral, surface: Term, members: Sequence[Branch], branches: list[Branch], met: list[SurfaceRoot],
-    rate: Rate, folding: bool,
+    rate: Rate, wanted: Roots,
 ) -> list[Term]:  # fmt: skip
     """The boundary terms of a surface at its roots, but those already met; under loops each instance of it has a pivot
     of its own. Raises NoClosedForm."""
@@ -99,7 +99,7 @@ def _at_surface(
     alternatives: list[tuple[Term | None, Term]] = []
     apart: list[Term] = []
     earlier: list[Term] = []
-    for pivot in pivots(node, surface, folding):
+    for pivot in pivots(node, surface, wanted):
         new = [r for r in pivot.roots if not any(_same(r, other) for other in met)]
         where = earlier if pivot.condition is None else [*earlier, pivot.condition]
         each = where if any(loop.variable in term.free for loop in loops for term in where) else []

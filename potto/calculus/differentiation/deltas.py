@@ -14,7 +14,7 @@ from potto.calculus.differentiation import level_sets
 from potto.calculus.differentiation.between import between, scaled
 from potto.calculus.differentiation.boundary_terms import remaining
 from potto.calculus.differentiation.derivative import partial, total, vanishes, zero_like
-from potto.calculus.solving.pivots import NoClosedForm, SurfaceRoot, chosen, pivots
+from potto.calculus.solving.pivots import NoClosedForm, Roots, SurfaceRoot, chosen, pivots
 from potto.calculus.surfaces.branch_assignment import branches_of, flipping, forced, unguarded
 from potto.core.printer import format_term
 from potto.core.simplify import normalized_surface
@@ -48,12 +48,12 @@ PRODUCT_OF_DELTAS = declare("P0505", "a product of deltas on the same surface")
 _MOST = 64  # deltas integrated out of one integral
 
 
-def without_deltas(node: Integral, folding: bool = False) -> Term:
+def without_deltas(node: Integral, wanted: Roots = Roots.STEADY) -> Term:
     """The integral with every delta over its variables integrated out that can be, those of level sets left. Raises
-    PottoError (P0505). folding: also where roots merge as the other variables vary."""
+    PottoError (P0505). wanted: at which roots."""
     if not any(isinstance(n, Delta) for n in postorder(node.body)):
         return node
-    body = transform(_inner_first(node.body, folding), lambda _, new: _chosen(new) if isinstance(new, Delta) else new)
+    body = transform(_inner_first(node.body, wanted), lambda _, new: _chosen(new) if isinstance(new, Delta) else new)
     if body is not node.body:
         node = with_integrand(node, body)
     parts: list[Term] = []
@@ -62,7 +62,7 @@ def without_deltas(node: Integral, folding: bool = False) -> Term:
         if not waiting:
             break
         term = waiting.pop()
-        found = _next(term, folding) if isinstance(term, Integral) else None
+        found = _next(term, wanted) if isinstance(term, Integral) else None
         if found is None:
             parts.append(term)
         else:
@@ -98,11 +98,11 @@ def _chosen(what: Delta) -> Term:
     return if_(choice.condition, side(True), side(False))
 
 
-def _inner_first(body: Term, folding: bool) -> Term:
-    return transform(body, lambda _, new: without_deltas(new, folding) if isinstance(new, Integral) else new)
+def _inner_first(body: Term, wanted: Roots) -> Term:
+    return transform(body, lambda _, new: without_deltas(new, wanted) if isinstance(new, Integral) else new)
 
 
-def _next(node: Integral, folding: bool) -> list[Term] | None:
+def _next(node: Integral, wanted: Roots) -> list[Term] | None:
     """What an integral comes to with one delta integrated out, or in a summand of its own; None if nothing is left."""
     if level_sets.placed_along(node) is not None:
         return None
@@ -110,7 +110,7 @@ def _next(node: Integral, folding: bool) -> list[Term] | None:
     deltas = level_sets.deltas_over(node)
     for item in postorder(node.body):
         if isinstance(item, Sum) and any(item.variable in what.coordinates[0].free for what in deltas):
-            return _summed(node, item, folding)
+            return _summed(node, item, wanted)
     for what in deltas:
         parts = level_sets.coefficient(node.body, what)
         if parts is None:
@@ -120,7 +120,7 @@ def _next(node: Integral, folding: bool) -> list[Term] | None:
         if level_sets.is_steep(what):
             return [*alone, *level_sets.by_parts(node, what, factor)]
         try:
-            return [*alone, *_eliminated(node, what, factor, folding)]
+            return [*alone, *_eliminated(node, what, factor, wanted)]
         except NoClosedForm as problem:
             reason = problem
             _check_apart(factor, what)
@@ -132,7 +132,7 @@ def _next(node: Integral, folding: bool) -> list[Term] | None:
     raise NoClosedForm(f"two surfaces meet, neither of which can be solved for a variable: {reason}")
 
 
-def _summed(node: Integral, item: Sum, folding: bool) -> list[Term]:
+def _summed(node: Integral, item: Sum, wanted: Roots) -> list[Term]:
     """A sum of deltas as a sum of integrals. Raises NoClosedForm, PottoError (P0505)."""
     parts = level_sets.coefficient(node.body, item)
     if parts is None:
@@ -141,7 +141,7 @@ def _summed(node: Integral, item: Sum, folding: bool) -> list[Term]:
         raise NoClosedForm("how many deltas there are varies with a variable of integration")
     factor, rest = parts
     each = with_integrand(node, _times(factor, item.body))
-    whole = sum_(item.variable, item.lo, item.hi, without_deltas(each, folding))
+    whole = sum_(item.variable, item.lo, item.hi, without_deltas(each, wanted))
     return [whole] if vanishes(rest) else [whole, with_integrand(node, rest)]
 
 
@@ -152,11 +152,11 @@ def _times(factor: Term, value: Term) -> Term:
     return scaled(factor, value) if isinstance(factor, Tuple) else scaled(value, factor)
 
 
-def _eliminated(node: Integral, what: Delta, factor: Term, folding: bool) -> list[Term]:
+def _eliminated(node: Integral, what: Delta, factor: Term, wanted: Roots) -> list[Term]:
     """f delta(psi): f at the roots of psi. Raises NoClosedForm."""
     found = [
         (pivot.condition, [_at_root(node, what, factor, root) for root in pivot.roots])
-        for pivot in pivots(node, what.coordinates[0], folding)
+        for pivot in pivots(node, what.coordinates[0], wanted)
     ]
     if len(found) == 1:
         return found[0][1]  # each of them may hold the next delta, so they stay apart

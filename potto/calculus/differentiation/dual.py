@@ -21,6 +21,7 @@ from potto.calculus.differentiation.level_sets import level_set, steep, transpor
 from potto.calculus.differentiation.stand_ins import as_values
 from potto.calculus.inlining.choices import calls_of_items, jumps_as_function
 from potto.calculus.inlining.expand import Resolve, expanded, heads_of, known_function
+from potto.calculus.solving.pivots import Roots
 from potto.calculus.surfaces.case_split import resolved
 from potto.calculus.surfaces.trace import spine
 from potto.core.terms import (
@@ -88,7 +89,7 @@ def dual(term: Term, tangents: Mapping[str, Term], resolve: Resolve = nothing_kn
     resolve: the terms of other definitions; those that are not known stay calls of `Deriv(definition)`.
     Raises PottoError (P0502, P0505) where the derivative has no meaning or no closed form.
     """
-    return Differentiator(resolve, folding=True).dual(term, tangents)
+    return Differentiator(resolve, wanted=Roots.ALL).dual(term, tangents)
 
 
 def dual_function(function: Lam, resolve: Resolve = nothing_known, frozen: bool = False) -> Lam:
@@ -106,17 +107,17 @@ def split_pairs(value: Term, tangent: Term) -> Term:
 class Differentiator:
     """One derivation. singular: a jump becomes a delta, for an integral is around it; frozen: it stands still.
 
-    folding: closed forms are wanted, also of roots that merge.
+    wanted: at which roots of surfaces closed forms are.
     """
 
     def __init__(
         self, resolve: Resolve, singular: bool = False, pairs: Callable[[Term, Term], Term] | None = None,
-        frozen: bool = False, folding: bool = False,
+        frozen: bool = False, wanted: Roots = Roots.STEADY,
     ) -> None:  # fmt: skip
         self.resolve = resolve
         self.singular = singular
         self.frozen = frozen
-        self.folding = folding
+        self.wanted = wanted
         self.pair = pairs or split_pairs
 
     def dual(self, term: Term, tangents: Mapping[str, Term]) -> Dual:
@@ -138,7 +139,7 @@ class Differentiator:
 
     def carried_out(self, term: Term) -> Term:
         """Calls of known functions carried out, derivatives of known functions too, with deltas for jumps."""
-        inside = Differentiator(self.resolve, not self.frozen, frozen=self.frozen, folding=self.folding)
+        inside = Differentiator(self.resolve, not self.frozen, frozen=self.frozen, wanted=self.wanted)
         return calls_of_items(expanded(term, self.resolve, inside.function), self.resolve)
 
 
@@ -220,7 +221,7 @@ class _Pass:
     def where_it_moves(self, part: Term, slope: Term) -> Term:
         """What a parameter adds that is an exponent: nothing where it stands still, also where no derivative by it is a
         number, as that of x^n at x < 0. In formulas everything that is named moves."""
-        named = isinstance(slope, Var | Proj) and not self.owner.folding
+        named = isinstance(slope, Var | Proj) and self.owner.wanted is Roots.STEADY
         return if_(prim("eq", slope, ZERO), ZERO, part) if named else part
 
     def branch(self, node: Branch) -> Dual:
@@ -367,10 +368,11 @@ class _Pass:
         whole = resolved(loops.stepped(self.owner.carried_out(joined(node, self.owner.resolve))))
         if isinstance(whole, Integral) and isinstance(whole.body, Array | ListOf):
             whole = loops.of_integrals(whole)
-        fewer = whole if self.owner.folding or not isinstance(whole, Integral) else combined(whole)
+        apart = self.owner.wanted is not Roots.STEADY or not isinstance(whole, Integral)
+        fewer = whole if apart else combined(whole)
         if not isinstance(whole, Integral) or fewer is not whole:  # deltas of a combination have one root
             return _Pass(self.owner, self.tangents).run(fewer)
-        plain = without_leftovers(without_deltas(whole, self.owner.folding))
+        plain = without_leftovers(without_deltas(whole, self.owner.wanted))
         if not isinstance(plain, Integral):
             return _Pass(self.owner, self.tangents).run(plain)
         moving = {n: t for n, t in self.tangents.items() if n not in plain.variables}
@@ -391,5 +393,5 @@ class _Pass:
         inside = rate(plain.body)
         parts: list[Term] = [] if loops.vanishes(inside) else [with_integrand(plain, inside)]
         if not self.owner.frozen:
-            parts += [*at_bounds(plain, rate), *at_surfaces(plain, frozenset(moving), rate, self.owner.folding)]
+            parts += [*at_bounds(plain, rate), *at_surfaces(plain, frozenset(moving), rate, self.owner.wanted)]
         return plain, total([p for p in parts if p is not ZERO], zero_like(plain.body))

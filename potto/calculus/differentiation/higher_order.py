@@ -11,7 +11,7 @@ from potto.calculus.differentiation.derivative import NotSmooth
 from potto.calculus.differentiation.dual import Differentiator
 from potto.calculus.differentiation.level_sets import coefficient
 from potto.calculus.inlining.expand import Resolve, heads_of, named
-from potto.calculus.solving.pivots import NoClosedForm
+from potto.calculus.solving.pivots import NoClosedForm, Roots
 from potto.core.terms import (
     ZERO,
     Delta,
@@ -51,7 +51,7 @@ def first_derivative(term: Term, resolve: Resolve) -> Term:
     tangents = {p: var(f"d{p}") for p in params}
     names = tuple(dict.fromkeys((*params, *(f"d{p}" for p in params))))
     try:
-        return lam(names, Differentiator(resolve, folding=True).dual(body, tangents)[1])
+        return lam(names, Differentiator(resolve, wanted=Roots.ALL).dual(body, tangents)[1])
     except (NoClosedForm, NotSmooth) as problem:
         raise NoText(f"the first derivative has no closed form: {problem}") from None
     except PottoError as problem:

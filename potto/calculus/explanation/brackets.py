@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from fractions import Fraction
-from math import gcd, lcm
+from math import gcd, isqrt, lcm
 
 from msgspec import Struct
 
@@ -31,6 +31,7 @@ from potto.core.terms import (
     div,
     mul,
     neg,
+    prim,
     sub,
 )
 
@@ -207,6 +208,8 @@ def _plain(item: Inequality, box: Box) -> list[Inequality]:
         without_root = _squared(found.top, item.strict, box) or _odd_root(found.top, item.strict)
         if without_root is not None:
             return [each for one in without_root for each in _plain(one, box)]
+    if found.whole and (bounds := _below_square(found.top, item.strict)) is not None:
+        return bounds
     if len(found.top) == 1:
         return _without_even(item, found.top, found.below, box)
     return [item]
@@ -228,6 +231,8 @@ def _squared(form: Polynomial, strict: bool, box: Box) -> list[Inequality] | Non
     if rest is None:
         return None
     exists = Inequality(inside, False)
+    if scale < 0 and strict and range_of(rest, box).hi <= 0:
+        return [NEVER]
     if scale < 0:  # sqrt(u) < rest
         return (
             [exists, Inequality(written_out(sub(mul(rest, rest), inside)), strict)]
@@ -239,6 +244,22 @@ def _squared(form: Polynomial, strict: bool, box: Box) -> list[Inequality] | Non
     if range_of(rest, box).lo >= 0:
         return [exists]
     return [Inequality(written_out(sub(inside, mul(rest, rest))), strict)] if range_of(rest, box).hi <= 0 else None
+
+
+def _below_square(form: Polynomial, strict: bool) -> list[Inequality] | None:
+    """u^2 < c^2 as -c < u < c, of a name u and a number c."""
+    match [(monomial, scale) for monomial, scale in form.items() if monomial]:
+        case [(((Var() as u, 2),), scale)] if len(form) == 2 and scale < 0:
+            square = Fraction(form[()]) / -Fraction(scale)
+        case _:
+            return None
+    if square <= 0:
+        return None
+    root = Fraction(isqrt(square.numerator), isqrt(square.denominator))
+    bound = number(root) if root * root == square else None
+    if bound is None and square.denominator == 1:
+        bound = prim("sqrt", const(float(square)))
+    return None if bound is None else [Inequality(add(u, bound), strict), Inequality(sub(bound, u), strict)]
 
 
 def _odd_root(form: Polynomial, strict: bool) -> list[Inequality] | None:

@@ -28,7 +28,7 @@ from potto.calculus.explanation.plain_names import Each, plainly_indexed, plainl
 from potto.calculus.explanation.readable import ReadableParts, readable
 from potto.calculus.explanation.symbols import NoFormula, Rewrite, Words, over_functions
 from potto.calculus.inlining.expand import Resolve, heads_of
-from potto.calculus.solving.pivots import NoClosedForm, SurfaceRoot, pivots
+from potto.calculus.solving.pivots import NoClosedForm, Roots, SurfaceRoot, pivots
 from potto.calculus.solving.solve import factors
 from potto.calculus.surfaces.branch_assignment import box_of, branches_of, with_index
 from potto.calculus.surfaces.branch_assignment import unguarded as where_it_exists
@@ -140,7 +140,7 @@ def describe(
         ReadableParts(pause),
     )
     tangents: dict[str, Term] = {p: var(f"d{p}") for p in params}
-    work = Differentiator(resolve, folding=True)
+    work = Differentiator(resolve, wanted=Roots.READ)
     problems: list[str] = []
     tangent = ""
     try:
@@ -258,7 +258,7 @@ def _integral(
         reason = "" if plain is None else _why_searched(plain)
         if plain is not None and level_set(plain) is None:
             bounds = [words.text(t, *indices, box=ranges) for t in at_bounds(plain, rate)]
-            swept = at_surfaces(plain, frozenset(inside), rate, True)
+            swept = at_surfaces(plain, frozenset(inside), rate, Roots.READ)
             swept = [t for t in swept if not (isinstance(t, Integral) and level_set(t))]
             boundary = [words.text(t, *indices, box=ranges) for t in swept]
     except (NoClosedForm, NotSmooth, NoFormula) as problem:
@@ -292,7 +292,7 @@ def _without_deltas(node: Integral) -> Integral | None:
     """The integral with its deltas integrated out, if it is still one then."""
     whole = opened(node)
     assert isinstance(whole, Integral)
-    plain = without_deltas(whole, True)
+    plain = without_deltas(whole, Roots.READ)
     return plain if isinstance(plain, Integral) else None
 
 
@@ -325,7 +325,7 @@ def _surfaces(node: Integral, tangents: Mapping[str, Term], words: Words) -> tup
                 continue
             roots: list[str] = []
             try:
-                for root in pivots(node, factor)[0].roots:
+                for root in pivots(node, factor, Roots.READ)[0].roots:
                     roots.append(f"{root.variable} = {_root(root, words)}")
             except NoClosedForm:
                 pass

@@ -18,6 +18,7 @@ from potto.core.polynomials import Exact, number, over
 from potto.core.printer import format_term
 from potto.core.terms import (
     ONE,
+    PI,
     ZERO,
     App,
     Branch,
@@ -41,6 +42,8 @@ from potto.core.terms import (
 _HALF = Fraction(1, 2)
 _PLAIN, _TANGENT, _DELTA = range(3)
 _DIGITS = 15
+_FEW = 6  # digits of a number that a person has written
+_LARGEST_DIVISOR = 1000
 _LARGEST = 64  # of an exponent
 _PARTS = range(3, 13)  # of roots that are told as exponents
 
@@ -164,9 +167,16 @@ def _tidied(known: Factors) -> Factors:
             if exponent > 0 and value > 1 and (other or found.coefficient.denominator % value.numerator == 0):
                 found.coefficient *= value
                 found.powers[base] = exponent - 1
+        if is_parity(base):
+            found.times(base, exponent % 2 - exponent)
         if isinstance(base, Prim) and base.op == "sign":
             _signed(found, base)
     return found
+
+
+def is_parity(base: Term) -> bool:
+    """Whether it is a power of -1, by a whole number."""
+    return isinstance(base, Prim) and base.op == "pow" and base.args[0] == const(-1.0)
 
 
 def _signed(found: Factors, sign: Prim) -> None:
@@ -222,7 +232,7 @@ def written(found: Factors, tangents: frozenset[str]) -> Term:
 
 
 def _powers(found: Factors, bases: Iterable[Term], sign: int) -> list[Term]:
-    """Bases with their exponents, all square roots as one."""
+    """Bases with their exponents, square roots last."""
     roots: list[Term] = []
     out: list[Term] = []
     for base in bases:
@@ -231,7 +241,18 @@ def _powers(found: Factors, bases: Iterable[Term], sign: int) -> list[Term]:
             roots.append(base)
         else:
             out.append(_raised(base, exponent))
-    return [*out, prim("sqrt", mul(*roots))] if roots else out
+    return [*out, *(prim("sqrt", root) for root in roots)]
+
+
+def with_one_root(node: Term) -> Term:
+    """A product with its square roots as one."""
+    if not isinstance(node, Prim) or node.op != "mul":
+        return node
+    roots = [arg for arg in node.args if isinstance(arg, Prim) and arg.op == "sqrt"]
+    if len(roots) < 2:
+        return node
+    others = [arg for arg in node.args if arg not in roots]
+    return mul(*others, prim("sqrt", mul(*(root.args[0] for root in roots))))
 
 
 def _raised(base: Term, exponent: Exact) -> Term:
@@ -253,9 +274,9 @@ def _place(base: Term, tangents: frozenset[str]) -> int:
 
 
 def _order(base: Term) -> tuple[int, str]:
-    """Names first, in the order of the alphabet, then calls, then sums."""
+    """Names first, in the order of the alphabet, pi before others, then calls, then sums."""
     if isinstance(base, Var | Const):
-        return 0, format_term(base)
+        return 0, "" if base is PI else format_term(base)
     return (2 if isinstance(base, Prim) and base.op == "add" else 1), ""
 
 
@@ -269,11 +290,29 @@ def is_tangent(base: Term, tangents: frozenset[str]) -> bool:
 
 
 def _scale(value: Fraction, divided: bool) -> tuple[Term, Term]:
-    """A coefficient as a factor and a divisor: r/2 rather than 0.5*r, and 0.45 as it is."""
+    """A coefficient as a factor and a divisor: r/2 rather than 0.5*r, 0.45 as it is, 1/0.18 for 5.555555555555555."""
     small = value.denominator <= 12 and value.numerator < 100
     if value.denominator == 1 or (small and (divided or value.denominator < 10)):
         return const(float(value.numerator)), const(float(value.denominator))
+    if not _is_short(value):
+        for top in range(1, 10):
+            below = _short(float(top / value), _FEW)
+            if _is_short(Fraction(repr(below))) and _rounds_to(Fraction(top) / Fraction(repr(below)), value):
+                return const(float(top)), const(below)
+        near = value.limit_denominator(_LARGEST_DIVISOR)
+        if near.numerator < _LARGEST_DIVISOR and _rounds_to(near, value):
+            return const(float(near.numerator)), const(float(near.denominator))
     return _number(value), ONE
+
+
+def _is_short(value: Fraction) -> bool:
+    """Whether its decimals are few."""
+    return _rounds_to(Fraction(f"{float(value):.{_FEW}g}"), value)
+
+
+def _rounds_to(exact: Fraction, value: Fraction) -> bool:
+    """Whether a value is what rounding has made of another one."""
+    return abs(exact - value) <= 4 * Fraction(math.ulp(float(value)))
 
 
 def _number(value: Fraction) -> Term:
@@ -283,7 +322,16 @@ def _number(value: Fraction) -> Term:
     return number(value) or const(float(value))
 
 
-def _short(value: float) -> float:
+def _short(value: float, digits: int = _DIGITS) -> float:
     """0.45 for what rounding has made 0.44999999999999996."""
-    short = float(f"{value:.{_DIGITS}g}")
+    short = float(f"{value:.{digits}g}")
     return short if abs(short - value) <= 4 * math.ulp(value) else value
+
+
+def added(parts: list[Term]) -> Term:
+    """A sum, what is taken away last."""
+    return add(*(p for p in parts if not is_negative(p)), *(p for p in parts if is_negative(p)))
+
+
+def is_negative(term: Term) -> bool:
+    return isinstance(term, Prim) and term.op == "neg"

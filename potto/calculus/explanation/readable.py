@@ -16,10 +16,12 @@ from msgspec import Struct
 from potto.calculus.algebra.ranges import Box, ValueRange, range_of
 from potto.calculus.algebra.rational_form import Rational, normal
 from potto.calculus.explanation.alternatives import holds, in_one, sums_of_choices
-from potto.calculus.explanation.brackets import Inequality, between, conditions, fewer, opposite, plainer
+from potto.calculus.explanation.angles import at_angle, length
+from potto.calculus.explanation.brackets import Inequality, between, conditions, fewer, plainer
 from potto.calculus.explanation.brackets import bracket as bracket_of
 from potto.calculus.explanation.decimals import root_of_number
-from potto.calculus.explanation.factors import Factors, factored, is_tangent, written
+from potto.calculus.explanation.factors import Factors, added, factored, is_negative, is_tangent, with_one_root, written
+from potto.calculus.explanation.signs import sign_of_product, sums_of_signs
 from potto.calculus.surfaces.branch_assignment import box_of, with_index
 from potto.core.polynomials import Monomial, Polynomial, shared_by, without
 from potto.core.printer import LEFT_OUT, format_term
@@ -80,8 +82,10 @@ def readable(
     variables."""
     if LEFT_OUT in format_term(term, _LONG):
         return term
-    work = _Work(tangents, _bound(term) | frozenset(box or ()), progress or ReadableParts())
-    return _decided(transform(term, lambda _, new: work.node(new)), box or {}, work)
+    integers = frozenset(node.variable for node in postorder(term) if isinstance(node, Sum | Array | Fold))
+    work = _Work(tangents, _bound(term) | frozenset(box or ()), integers, progress or ReadableParts())
+    found = _decided(transform(term, lambda _, new: work.node(new)), box or {}, work)
+    return transform(found, lambda _, new: with_one_root(new))
 
 
 def _bound(term: Term) -> frozenset[str]:
@@ -140,15 +144,20 @@ def _taken(node: Branch, bounds: ValueRange) -> Term | None:
 
 
 class _Work:
-    def __init__(self, tangents: frozenset[str], inside: frozenset[str], progress: ReadableParts) -> None:
+    def __init__(
+        self, tangents: frozenset[str], inside: frozenset[str], integers: frozenset[str], progress: ReadableParts
+    ) -> None:
         self.progress = progress
         self.tangents = tangents
+        self.integers = integers
         self.inside = inside  # variables of integration, on which no `sign` may depend
 
     def node(self, node: Term) -> Term:
         if isinstance(node, Prim) and node.op == "sqrt":
             node = root_of_number(node)
         match node:
+            case Prim(op="hypot"):
+                return length(node)
             case Prim(op=op) if op in _ARITHMETIC:
                 key = node, self.tangents, self.inside
                 if key not in self.progress.known:
@@ -168,10 +177,14 @@ class _Work:
                 (item,) = between([Inequality(node.surface, node.strict)])
                 whole = branch((item.surface,), item.strict, node.then, node.orelse)
                 return in_one(whole, self.tangents, self.inside, self._cost) if isinstance(whole, Branch) else whole
+            case Prim(op="sign"):
+                return sign_of_product(node)
+            case Prim():
+                return at_angle(node, self.integers)
+            case Sum(lo=Const(value=lo), hi=Const(value=hi)) if hi <= lo:
+                return substitute(node.body, {node.variable: node.lo}) if lo == hi else ZERO
             case If():
                 return in_one(node, self.tangents, self.inside, self._cost)
-            case Prim(op="hypot"):
-                return _length(node)
             case Integral(body=Prim(op="neg", args=(inner,))):
                 return neg(with_integrand(node, inner))
             case Integral():
@@ -199,7 +212,7 @@ class _Work:
         """The shortest of: the product of its factors, and the node expanded, with the sums in it or around them."""
         match node.op:
             case "add":
-                forms = [node, *self._signs(node), *self._choices(node)]
+                forms = [node, *sums_of_signs(node, self.tangents, self.inside), *self._choices(node)]
             case "sqrt":
                 forms = [written(factored(node), self.tangents), *self._of_squares(node)]
             case _:
@@ -245,7 +258,7 @@ class _Work:
         whole = self._expanded(form)[1]
         parts = whole.args if isinstance(whole, Prim) and whole.op == "add" else (whole,)
         led = [p for p in parts if not p.free.isdisjoint(self.inside)] or list(parts)
-        return _added([neg(p) for p in parts]) if all(map(_is_negative, led)) else whole
+        return added([neg(p) for p in parts]) if all(map(is_negative, led)) else whole
 
     def _with_sums_named(self, node: Term) -> tuple[Term, list[tuple[str, Term]]]:
         """The node with a name for each sum that is a factor in it: (x - m)^2 is not taken apart then."""
@@ -311,7 +324,7 @@ class _Work:
         common = tuple(shared.items())
         whole = self._product(scale, (common, 1), *([(((inner, 1),), 1)]), (under, -1))
         apart = [self._product(c * scale, (m, 1), (common, 1), (under, -1)) for m, c in rest.items()]
-        return [whole, _added(apart)]
+        return [whole, added(apart)]
 
     def _around_tangents(self, form: Polynomial) -> Term:
         """A polynomial as a sum over its tangents, each with all that it is multiplied by."""
@@ -326,37 +339,10 @@ class _Work:
             scale = _content(rest)
             inner = self._sum({m: c / scale for m, c in rest.items()})
             parts.append(self._product(scale, (tuple(shared.items()), 1), (((inner, 1),), 1), (moving, 1)))
-        return _added(parts)
+        return added(parts)
 
     def _sum(self, form: Polynomial) -> Term:
-        return _added([self._product(Fraction(c), (m, 1)) for m, c in form.items()])
-
-    def _signs(self, node: Prim) -> list[Term]:
-        """[u > 0] - [u < 0] as the sign of u."""
-        parts = [factored(arg) for arg in node.args]
-        for i, first in enumerate(parts):
-            for j in range(i + 1, len(parts)):
-                found = self._sign(first, parts[j])
-                if found is not None:
-                    return [_added([found, *(a for k, a in enumerate(node.args) if k not in (i, j))])]
-        return []
-
-    def _sign(self, first: Factors, second: Factors) -> Term | None:
-        same = first.powers == second.powers and first.exponents == second.exponents
-        if not same or first.coefficient != -second.coefficient:
-            return None
-        one = [c for c in first.conditions if c not in second.conditions]
-        other = [c for c in second.conditions if c not in first.conditions]
-        if len(one) != 1 or len(other) != 1 or not opposite(one[0], other[0]):
-            return None
-        if not one[0].surface.free.isdisjoint(self.inside):
-            return None
-        kept = [c for c in first.conditions if c is not one[0]]
-        found = Factors(first.coefficient, dict(first.powers), list(first.exponents), kept)
-        positive, turned = (one[0].surface, 1) if not _is_negative(one[0].surface) else (other[0].surface, -1)
-        found.coefficient *= turned
-        found.times(prim("sign", positive), 1)
-        return written(factored(written(found, self.tangents)), self.tangents)
+        return added([self._product(Fraction(c), (m, 1)) for m, c in form.items()])
 
 
 def _sums_to_zero(first: Term, second: Term) -> bool:
@@ -364,23 +350,8 @@ def _sums_to_zero(first: Term, second: Term) -> bool:
     return found is not None and not found.top
 
 
-def _length(node: Prim) -> Term:
-    """hypot(x, -y) as hypot(x, y), and the length of (x, sqrt(r^2 - x^2)) as abs(r)."""
-    sides = tuple(a.args[0] if isinstance(a, Prim) and a.op == "neg" else a for a in node.args)
-    found = normal(add(*(mul(a, a) for a in sides)))
-    if found is not None and found.whole and len(found.top) == 1:
-        ((monomial, scale),) = found.top.items()
-        if scale == 1 and monomial and all(n % 2 == 0 for _, n in monomial):
-            return prim("abs", mul(*(pow_(a, const(n / 2)) for a, n in monomial)))
-    return prim("hypot", *sides)
-
-
 def _is_endless(bound: Term) -> bool:
     return isinstance(bound, Const) and not isfinite(bound.value)
-
-
-def _is_negative(term: Term) -> bool:
-    return isinstance(term, Prim) and term.op == "neg"
 
 
 def _content(form: Polynomial) -> Fraction:
@@ -390,8 +361,3 @@ def _content(form: Polynomial) -> Fraction:
     if below > 1000 or top > 1000:
         return Fraction(1)
     return Fraction(-top if all(c < 0 for c in form.values()) else top, below)
-
-
-def _added(parts: list[Term]) -> Term:
-    """A sum, what is taken away last."""
-    return add(*(p for p in parts if not _is_negative(p)), *(p for p in parts if _is_negative(p)))

@@ -1,25 +1,42 @@
 """Which variable of integration a surface is solved for.
 
-Owns `pivots`. The innermost variable that the surface can be solved for in closed form; for an affine surface the
-variable of the largest slope, chosen at run time where slopes are known only then.
+Owns `Roots` and `pivots`. The innermost variable that the surface can be solved for in closed form; for an affine
+surface the variable of the largest slope, chosen at run time where slopes are known only then.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from enum import Enum, auto
+from functools import partial, reduce
 
 from msgspec import Struct
 
 from potto.calculus.algebra.affine import affine
-from potto.calculus.algebra.ranges import range_of
+from potto.calculus.algebra.ranges import Box, range_of
+from potto.calculus.algebra.rational_form import is_zero
 from potto.calculus.solving.solve import Family, Sections, sections
-from potto.calculus.surfaces.branch_assignment import unguarded
-from potto.core.terms import Const, Integral, Term, const, if_, prim, substitute
+from potto.calculus.surfaces.branch_assignment import box_of, unguarded
+from potto.core.simplify import simplify
+from potto.core.terms import Const, Integral, Prim, Term, const, if_, prim, sub, substitute, transform
+from potto.primitives import PRIMITIVES
 
 
 class NoClosedForm(Exception):
     """A boundary that cannot be written with the builtins; evaluation finds it by numbers."""
+
+
+class Roots(Enum):
+    """Which roots are wanted in closed form.
+
+    STEADY: but those along which the surface turns back as the others vary, where what is added up is infinite.
+    ALL: these too. READ: all, as textbooks write them, whatever cancels in them: for formulas that are shown.
+    """
+
+    STEADY = auto()
+    ALL = auto()
+    READ = auto()
 
 
 class SurfaceRoot(Struct, frozen=True):
@@ -38,12 +55,11 @@ class Pivot(Struct, frozen=True):
     condition: Term | None = None
 
 
-def pivots(node: Integral, surface: Term, folding: bool = True) -> list[Pivot]:
+def pivots(node: Integral, surface: Term, wanted: Roots = Roots.ALL) -> list[Pivot]:
     """Where a surface cuts the integral, solved for the innermost variable that it can be solved for.
 
     An affine surface whose slopes are known only at run time is solved for the variable of the largest slope then:
     the others may be 0. The pivots are tried in order, the last one has no condition.
-    folding: also for one along which the surface turns back as the others vary, where what is added up is infinite.
     """
     slopes: dict[str, Term] = {}
     for name in reversed(node.variables):
@@ -52,27 +68,28 @@ def pivots(node: Integral, surface: Term, folding: bool = True) -> list[Pivot]:
             slopes[name] = found.coefficients[0]
     order = [n for n in reversed(node.variables) if n in surface.free]
     if len(slopes) < 2 or order[0] not in slopes:
-        return [Pivot(_solved(node, surface, order, folding))]
+        return [Pivot(_solved(node, surface, order, wanted))]
     if all(isinstance(c, Const) for c in slopes.values()):
         sizes = {n: abs(c.value) for n, c in slopes.items() if isinstance(c, Const)}
         largest = max(sizes.values())
         name = next(n for n in order if sizes.get(n, 0.0) * _STEEP >= largest)
-        return [Pivot(_solved(node, surface, [name]))]
+        return [Pivot(_solved(node, surface, [name], wanted))]
     result: list[Pivot] = []
     for name, slope in slopes.items():
         others = [prim("le", prim("abs", c), prim("abs", slope)) for n, c in slopes.items() if n != name]
-        result.append(Pivot(_solved(node, surface, [name]), conjunction(others)))
+        result.append(Pivot(_solved(node, surface, [name], wanted), conjunction(others)))
     return [*result[:-1], Pivot(result[-1].roots)]
 
 
+_COUNTABLE = 1000.0  # integers, of which a person sees how many there are
 _STEEP = 8.0  # a slope this much smaller than the largest one is still fine to divide by
 
 
-def _solved(node: Integral, surface: Term, order: Sequence[str], folding: bool = True) -> list[SurfaceRoot]:
+def _solved(node: Integral, surface: Term, order: Sequence[str], wanted: Roots) -> list[SurfaceRoot]:
     reasons: list[str] = []
     for name in order:
-        found = sections(surface, name)
-        turning = () if folding or not isinstance(found, Sections) else found.turning
+        found = sections(surface, name, plain=wanted is Roots.READ)
+        turning = found.turning if wanted is Roots.STEADY and isinstance(found, Sections) else ()
         if any(turn.free & frozenset(node.variables) for turn in turning):
             reasons.append(f"it turns back along `{name}`")
         elif isinstance(found, Sections) and _is_a_factor(node, surface, name, found):
@@ -80,7 +97,7 @@ def _solved(node: Integral, surface: Term, order: Sequence[str], folding: bool =
         elif isinstance(found, Sections) and found.complete:
             roots = [SurfaceRoot(name, r) for r in (*found.roots, *found.poles)]
             position = node.variables.index(name)
-            return roots + [_family(node, position, f) for f in (*found.families, *found.pole_families)]
+            return roots + [_family(node, position, f, wanted) for f in (*found.families, *found.pole_families)]
         else:
             reasons.append(found.reason)
     raise NoClosedForm(reasons[0] if reasons else "the surface varies with no variable of integration")
@@ -101,17 +118,57 @@ def chosen(alternatives: Sequence[tuple[Term | None, Term]]) -> Term:
     return result
 
 
-def _family(node: Integral, position: int, family: Family) -> SurfaceRoot:
+def _family(node: Integral, position: int, family: Family, wanted: Roots) -> SurfaceRoot:
     name, (lo, hi) = node.variables[position], node.bounds[position]
-    ends = [substitute(family.inner, {name: end}) for end in (lo, hi)]
-    if family.stops:
-        ends += [substitute(family.inner, {name: _within(stop, lo, hi)}) for stop in family.stops]
+    inner, stops = family.inner, family.stops
+    if wanted is Roots.READ:
+        inner, stops = _continued(inner, name, stops)
+    ends = [substitute(inner, {name: end}) for end in (lo, hi)]
+    ends += [substitute(inner, {name: _within(stop, lo, hi)}) for stop in stops]
     if any(map(_infinite, ends)) or any(not _finite(b) and _unbounded(e) for b, e in zip((lo, hi), ends, strict=False)):
         raise NoClosedForm(f"there are infinitely many roots in `{name}`")
+    if wanted is Roots.READ and (counts := _enclosing(ends, box_of(node))) is not None:
+        return SurfaceRoot(name, family.root, family.index, counts)
     ends = _corners(node, position, ends)
+    if wanted is Roots.READ:
+        ends = list(dict.fromkeys(map(simplify, ends)))
+        least, most = (reduce(partial(prim, op), ends) for op in ("min", "max"))
+        return SurfaceRoot(name, family.root, family.index, (prim("ceil", least), prim("floor", most)))
     lowest, highest = _extreme("min", ends), _extreme("max", ends)
     counts = (_whole("ceil", lowest, 1.0), _whole("floor", highest, 0.0))
     return SurfaceRoot(name, family.root, family.index, counts)
+
+
+def _continued(term: Term, name: str, stops: Iterable[Term]) -> tuple[Term, tuple[Term, ...]]:
+    """A function of a variable going on as it ends where it has no value, and the stops that are no such ends."""
+    edges: list[Term] = []
+
+    def change(_: Term, new: Term) -> Term:
+        if not isinstance(new, Prim) or name not in new.args[0].free or len(new.args) != 1:
+            return new
+        (low, high), inner = PRIMITIVES[new.op].within, new.args[0]
+        bounds = range_of(inner)
+        if bounds.lo < low:
+            edges.append(sub(inner, const(low)))
+            inner = prim("max", inner, const(low))
+        if bounds.hi > high:
+            edges.append(sub(const(high), inner))
+            inner = prim("min", inner, const(high))
+        return prim(new.op, inner)
+
+    whole = transform(term, change)
+    turns = [s for s in stops if not any(is_zero(substitute(edge, {name: s})) for edge in edges)]
+    return whole, tuple(turns)
+
+
+def _enclosing(ends: Iterable[Term], box: Box) -> tuple[Term, Term] | None:
+    """The integers that can belong to a root in the domain, if these are known without the parameters, and few. Which
+    of them do, the bounds ask of the root itself."""
+    ranges = [range_of(end, box) for end in ends]
+    low, high = min(r.lo for r in ranges), max(r.hi for r in ranges)
+    if not high - low <= _COUNTABLE:
+        return None
+    return const(float(math.ceil(low))), const(float(math.floor(high)))
 
 
 def _corners(node: Integral, position: int, ends: list[Term]) -> list[Term]:

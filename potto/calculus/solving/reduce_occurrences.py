@@ -46,8 +46,8 @@ from potto.primitives import PRIMITIVES
 Degrees = dict[Fraction, Term]
 
 
-def split(term: Prim, value: Term, name: str) -> Steps:
-    """Equations that together have the roots of `term = value`."""
+def split(term: Prim, value: Term, name: str, plain: bool = False) -> Steps:
+    """Equations that together have the roots of `term = value`; `plain`: as textbooks write them, whatever cancels."""
     if value is ZERO and term.op == "mul":
         return tuple(IsolationStep(factor, ZERO) for factor in term.args if name in factor.free)
     if term.op == "div":
@@ -58,10 +58,11 @@ def split(term: Prim, value: Term, name: str) -> Steps:
     same = _same_builtin(term, value)
     if same is not None:
         return same
-    for method in (_polynomial_in_something, _fraction, _cases):
-        steps = method(term, value, name)
-        if steps is not None:
-            return steps
+    steps = _polynomial_in_something(term, value, name, plain)
+    for method in (_fraction, _cases):
+        steps = method(term, value, name) if steps is None else steps
+    if steps is not None:
+        return steps
     return _why(term, name)
 
 
@@ -89,7 +90,7 @@ def _same_builtin(term: Prim, value: Term) -> Steps | None:
 # Polynomials
 
 
-def _polynomial_in_something(term: Prim, value: Term, name: str) -> Steps | None:
+def _polynomial_in_something(term: Prim, value: Term, name: str, plain: bool) -> Steps | None:
     whole = sub(term, value)
     for inner in dominators(whole, name):
         if inner is whole or inner is term:
@@ -97,7 +98,7 @@ def _polynomial_in_something(term: Prim, value: Term, name: str) -> Steps | None
         hidden = inner.name if isinstance(inner, Var) else fresh("z", whole.free)
         outer = whole if isinstance(inner, Var) else _replaced(whole, inner, var(hidden))
         found = collect(outer, hidden)
-        steps = None if found is None else _from_collected(found, hidden)
+        steps = None if found is None else _from_collected(found, hidden, plain)
         if steps is not None:
             back = {} if isinstance(inner, Var) else {hidden: inner}
             return tuple(
@@ -121,7 +122,7 @@ def _replaced(term: Term, old: Term, new: Term) -> Term:
     return transform(term, lambda node, made: new if node is old else made, below)
 
 
-def _from_collected(found: Collected, name: str) -> tuple[IsolationStep, ...] | None:
+def _from_collected(found: Collected, name: str, plain: bool) -> tuple[IsolationStep, ...] | None:
     found = Collected({m: c for m, c in found.parts.items() if not is_zero(c)})
     atoms = found.atoms
     if not atoms:
@@ -130,11 +131,11 @@ def _from_collected(found: Collected, name: str) -> tuple[IsolationStep, ...] | 
         (atom,) = atoms
         if name not in atom.free:
             return None
-        return _polynomial(found.degrees(atom), atom)
-    return _trigonometric(found) or _squared_away(found)
+        return _polynomial(found.degrees(atom), atom, plain)
+    return _trigonometric(found, plain) or _squared_away(found)
 
 
-def _polynomial(degrees: Degrees, atom: Term) -> tuple[IsolationStep, ...] | None:
+def _polynomial(degrees: Degrees, atom: Term, plain: bool) -> tuple[IsolationStep, ...] | None:
     """Roots of a polynomial in one atom, as atom^d = root for the common step d of its degrees."""
     least = min(degrees)
     unit = _common(d - least for d in degrees)
@@ -148,6 +149,8 @@ def _polynomial(degrees: Degrees, atom: Term) -> tuple[IsolationStep, ...] | Non
     highest = max(coefficients)
     if highest == 1:
         roots: tuple[Term, ...] = (quotient(minus(coefficients[0]), coefficients[1]),)
+    elif plain:
+        roots = quadratic_formula(coefficients[2], coefficients[1], coefficients[0])
     else:
         roots = quadratic(coefficients[2], coefficients[1], coefficients[0], merging=unit == 1)
     return (*steps, *(IsolationStep(inner, r) for r in roots))
@@ -184,6 +187,16 @@ def quadratic(a: Term, b: Term, c: Term, merging: bool) -> tuple[Term, Term]:
     return one, branch((neg(prim("abs", q)),), False, one, other)  # where q is 0 both are
 
 
+def quadratic_formula(a: Term, b: Term, c: Term) -> tuple[Term, Term]:
+    """The same by the formula that everybody knows: the lesser first where a is positive, none where it is 0."""
+    half = halved(b)
+    if half is None:
+        root = square_root(shorter(sub(pow_(b, TWO), mul(const(4.0), a, c))))
+        return quotient(sub(minus(b), root), mul(TWO, a)), quotient(add(minus(b), root), mul(TWO, a))
+    root = square_root(shorter(sub(pow_(half, TWO), mul(a, c))))
+    return quotient(sub(minus(half), root), a), quotient(add(minus(half), root), a)
+
+
 def halved(term: Term) -> Term | None:
     """term / 2 where a factor 2 stands in every summand."""
     if isinstance(term, Prim):
@@ -212,7 +225,7 @@ def _fraction(term: Prim, value: Term, name: str) -> Steps | None:
 # Two atoms
 
 
-def _trigonometric(found: Collected) -> tuple[IsolationStep, ...] | None:
+def _trigonometric(found: Collected, plain: bool) -> tuple[IsolationStep, ...] | None:
     """Polynomials in sin u and cos u: a sin u + b cos u = c, or one of them after sin^2 + cos^2 = 1."""
     sin = next((a for a in found.atoms if isinstance(a, Prim) and a.op == "sin"), None)
     cos = next((a for a in found.atoms if isinstance(a, Prim) and a.op == "cos"), None)
@@ -222,6 +235,8 @@ def _trigonometric(found: Collected) -> tuple[IsolationStep, ...] | None:
     table = {(dict(m).get(sin, nought), dict(m).get(cos, nought)): shorter(c) for m, c in found.parts.items()}
     if set(table) <= {(nought, nought), (one, nought), (nought, one)}:
         a, b, c = table[one, nought], table[nought, one], table.get((nought, nought), ZERO)
+        if plain and range_of(a).hi <= 0 and range_of(b).hi <= 0:
+            a, b, c = minus(a), minus(b), minus(c)
         turn, size = prim("atan2", a, b), prim("hypot", a, b)
         swing = prim("acos", quotient(minus(c), size))
         period = mul(TWO, PI)
@@ -237,7 +252,7 @@ def _trigonometric(found: Collected) -> tuple[IsolationStep, ...] | None:
                 degrees.setdefault(keep + 2, []).append(neg(part))
         else:
             sums = {d: shorter(add(*parts)) for d, parts in degrees.items()}
-            return _polynomial({d: c for d, c in sums.items() if not is_zero(c)}, atom)
+            return _polynomial({d: c for d, c in sums.items() if not is_zero(c)}, atom, plain)
     return None
 
 

@@ -112,16 +112,16 @@ class Goal(Struct, frozen=True):
         return at is not None
 
 
-def sections(surface: Term, name: str) -> Sections | Unsolvable:
-    """The roots of `surface = 0` in the variable `name`, in closed form."""
+def sections(surface: Term, name: str, plain: bool = False) -> Sections | Unsolvable:
+    """The roots of `surface = 0` in the variable `name`, in closed form; `plain`: to be read, not to be evaluated."""
     if name not in surface.free:
         return Unsolvable(f"the condition does not vary with `{name}`")
-    search = _Search(name, surface)
+    search = _Search(name, surface, plain)
     search.run(Goal(settled(surface, frozenset((name,))), ZERO))
     roots, families, reasons = search.roots, search.families, list(search.reasons)
     if reasons and not roots and not families:
         return Unsolvable(reasons[0])
-    poles = _Search(name, surface)
+    poles = _Search(name, surface, plain)
     for goal in _singular(surface, name):
         poles.run(goal)
     reasons += poles.reasons
@@ -176,8 +176,9 @@ def shared_factors(item: Prim) -> tuple[Term, ...]:
 class _Search:
     """The goals for one variable and what has come of them."""
 
-    def __init__(self, name: str, surface: Term) -> None:
+    def __init__(self, name: str, surface: Term, plain: bool = False) -> None:
         self.name = name
+        self.plain = plain
         self.taken = set(surface.free) | {name}
         self.roots: list[Term] = []
         self.families: list[Family] = []
@@ -234,7 +235,7 @@ class _Search:
         if len(where) == 1:
             steps = step(term, where[0], goal.value)
         else:
-            steps = split(term, goal.value, self.name)
+            steps = split(term, goal.value, self.name, self.plain)
         if isinstance(steps, Stuck):
             return steps
         goals: list[Goal] = []

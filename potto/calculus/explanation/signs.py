@@ -1,0 +1,65 @@
+"""Signs in a formula: of products, and those that a sum of two brackets is.
+
+Owns `sign_of_product` and `sums_of_signs`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from potto.calculus.algebra.ranges import range_of
+from potto.calculus.explanation.brackets import opposite
+from potto.calculus.explanation.factors import Factors, added, factored, is_negative, is_parity, written
+from potto.core.terms import Prim, Term, mul, neg, prim
+
+
+def sign_of_product(node: Prim) -> Term:
+    """The sign of a product by those of its factors whose signs are not known."""
+    found = factored(node.args[0])
+    if found.conditions or not found.coefficient:
+        return node
+    turned, left = found.coefficient < 0, list[Term]()
+    for base, n in found.powers.items():
+        if n.denominator != 1 or n % 2 == 0:  # a root, or an even power, has a value where it is above 0
+            continue
+        bounds = range_of(base)
+        if bounds.lo >= 0 or bounds.hi <= 0:
+            turned ^= bounds.lo < 0
+        elif is_parity(base):
+            left.append(base)
+        else:
+            left.append(prim("sign", base))
+    whole = mul(*left)
+    return neg(whole) if turned else whole
+
+
+def sums_of_signs(node: Prim, tangents: frozenset[str], inside: frozenset[str]) -> Iterator[Term]:
+    """[u > 0] - [u < 0] as the sign of u; inside: variables on which no sign may depend."""
+    parts = [factored(arg) for arg in node.args]
+    for i, first in enumerate(parts):
+        for j in range(i + 1, len(parts)):
+            found = _sign(first, parts[j], tangents, inside)
+            if found is not None:
+                yield added([found, *(a for k, a in enumerate(node.args) if k not in (i, j))])
+                return
+
+
+def _sign(first: Factors, second: Factors, tangents: frozenset[str], inside: frozenset[str]) -> Term | None:
+    same = first.powers == second.powers and first.exponents == second.exponents
+    if not same or first.coefficient != -second.coefficient:
+        return None
+    one = [c for c in first.conditions if c not in second.conditions]
+    other = [c for c in second.conditions if c not in first.conditions]
+    if len(one) != 1 or len(other) != 1 or not opposite(one[0], other[0]):
+        return None
+    if not one[0].surface.free.isdisjoint(inside):
+        return None
+    kept = [c for c in first.conditions if c is not one[0]]
+    found = Factors(first.coefficient, dict(first.powers), list(first.exponents), kept)
+    positive, turned = (one[0].surface, 1) if not is_negative(one[0].surface) else (other[0].surface, -1)
+    found.coefficient *= turned
+    signs = factored(sign_of_product(prim("sign", positive)))
+    found.coefficient *= signs.coefficient
+    for base, n in signs.powers.items():
+        found.times(base, n)
+    return written(factored(written(found, tangents)), tangents)
