@@ -6,9 +6,10 @@ Owns `Analysis`. All of it belongs to the one thread that works with the databas
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
+from potto.checking.recalled import keep_said, said_earlier
 from potto.diagnostics import Diagnostic
 from potto.modules import chunk_start, module_diagnostics, names, open_files, source, statements
 from potto.modules.graph import dependencies, imported_files
@@ -21,9 +22,9 @@ from potto.reports.render import Located
 from potto_lsp.documents import Document
 from potto_lsp.text import DocumentText, Encoding
 from potto_lsp.uris import to_key, to_uri
-from potto_lsp.verdicts import Verdicts
 
 if TYPE_CHECKING:
+    from potto.checking.kept import Kept
     from potto.crew import Crew
 
 logger = logging.getLogger(__name__)
@@ -50,12 +51,14 @@ class Analysis:
         self._documents: dict[str, Document] = {}
         self._texts: dict[str, DocumentText] = {}
         self._failing: dict[tuple[str, str], str] = {}
-        self._verdicts = Verdicts(self.db)
         self._checked: set[str] = set()  # files asked for; only the first answer may come from an earlier session
         self._ripe: set[str] = set()  # files checked since trees were last forgotten
         self.settled = False  # whether all files have been checked
         self._crew: Crew | None = None
-        self.taken: set[str] = set()  # files that helpers have checked
+        self._kept: Kept | None = None  # what an earlier session has found out, until it is taken over
+        self._looked = False  # whether that was looked for
+        self.taken: set[str] = set()  # files that helpers or an earlier session have checked
+        self.known_before: set[str] = set()  # those of an earlier session
 
     # What the client has
 
@@ -191,7 +194,7 @@ class Analysis:
         """What is wrong with a file. A bug of ours in one definition loses the diagnostics of that definition only."""
         if not self.settled and key in self._documents and key not in self._checked:
             self._checked.add(key)
-            known = self._verdicts.of(key)
+            known = said_earlier(self.db, key)
             if known is not None:
                 return known
         from potto.checking import check  # slow to import, and not needed for what is known from earlier
@@ -213,7 +216,8 @@ class Analysis:
         pay."""
         from potto.crew import Crew, helpers_for
 
-        files, texts = [key for key in self.programs() if key not in self._documents], self._open_texts()
+        known = self._documents.keys() | self.taken
+        files, texts = [key for key in self.programs() if key not in known], self._open_texts()
         if self._crew is None and (helpers := helpers_for(files, sum(map(len, texts.values())))):
             ends = [(key, text) for key in texts for text in pieces(self.db, key)]
             self._crew = Crew(self.db, self.files.roots, files, helpers, texts, ends)
@@ -262,14 +266,54 @@ class Analysis:
             self._crew.close()
         self._crew = None
 
-    # Later sessions
+    # Earlier and later sessions
+
+    def look_for_kept(self) -> None:
+        """Look for what an earlier session has found out about the workspace."""
+        from potto.checking.kept import Kept
+
+        if not self._looked:
+            self._kept, self._looked = Kept(self.db, self.files.roots), True
+
+    @property
+    def has_kept(self) -> bool:
+        """Whether there is more of that to take over."""
+        return self._kept is not None and self._kept.is_left
+
+    def take_kept(self) -> None:
+        """Take over what an earlier session has found out about one file."""
+        file = self._kept.take() if self._kept is not None else None
+        if file is not None:
+            self.taken.add(file)
+            self.known_before.add(file)
+        if not self.has_kept:
+            self._kept = None
+
+    def keep_all(self, kept: Callable[[], None]) -> Iterator[Callable[[], None]]:
+        """The steps by which what is known of the workspace is kept for later sessions. `kept` is called if nothing has
+        come between them."""
+        from potto.checking.kept import Keeper
+
+        keeper = Keeper(self.db, self.files.roots)
+
+        def add(file: str) -> None:
+            try:
+                keeper.add(file)
+            except Exception as error:
+                self.failed(file, "keeping", error)
+
+        def finish() -> None:
+            if keeper.finish():
+                kept()
+
+        for file in self.programs():
+            yield lambda file=file: add(file)  # type: ignore[misc]
+        yield finish
 
     def keep(self, key: str) -> None:
         """Keep what was found out about a file for later sessions."""
-        from potto.checking.check import diagnostics
-
         try:
-            self._verdicts.keep(key, diagnostics(self.db, key), diagnostics.__name__)
+            keep_said(self.db, key)
         except Exception as error:
             self.failed(key, "verdict", error)
 

@@ -107,7 +107,7 @@ def did_save(server: Server, params: Any) -> None:
 
     def saved() -> None:
         session = _session(server)
-        session.to_keep.add(key)
+        session.saved(key)
         if not session.watched:
             session.analysis.files.refresh((key, *session.analysis.files.data_files()))
 

@@ -115,6 +115,9 @@ class Server(StreamServer):
     def _rest(self) -> bool:
         """What there is time for while nothing is to be done; whether there will be more of it."""
         memory.rest()
+        assert self.session is not None and self.worker is not None
+        if self.session.keeps_next():
+            self.worker.check_again()
         return self._look_at_data()
 
     def _look_at_data(self) -> bool:

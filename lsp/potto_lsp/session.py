@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from potto_lsp.publishing import Publisher
 
 TREES = 50  # checked files after which the trees of closed ones are forgotten
+KEPT_ANEW, KEPT_BEFORE = 600.0, 20.0  # seconds until what is known of the workspace is kept again, or tried again
 Reply = Callable[[Any, Any], None]  # the client's answer and its error; one of them is None
 
 
@@ -55,6 +56,8 @@ class ClientSession:
         self.to_prepare: set[str] = set()  # files that were opened
         self._unknown_lints: list[str] = []
         self.to_keep: set[str] = set()  # saved files whose diagnostics are to be kept for later sessions
+        self._news = False  # whether there is more to keep of the workspace than is kept
+        self._keeping, self._keep_from = False, 0.0  # whether that is done next, and the time before which it is not
         self._progress = WorkProgress(self, "Potto: checking the workspace")
 
     def load(self) -> Database:
@@ -112,6 +115,7 @@ class ClientSession:
 
     def idle(self) -> Iterator[Callable[[], None] | None]:
         """The steps of idle work. Yields None once the diagnostics of open files have been sent."""
+        keeping, self._keeping = self._keeping, False
         if self.checked:
             opened = len(self.analysis.documents)
             for number, step in enumerate(self.publisher.steps_again()):
@@ -127,16 +131,20 @@ class ClientSession:
         for key in [key for key in self.to_keep if key in self.analysis.documents]:
             yield lambda key=key: self._keep(key)  # type: ignore[misc]
         yield self.live.refresh
+        if keeping:
+            yield from self.analysis.keep_all(self._all_kept)
 
     def _first_check(self) -> Iterator[Callable[[], None] | None]:
         """The first check of the whole workspace. It may take a while, so it shows progress."""
         if self.publisher.whole_workspace:
-            yield self.analysis.call_helpers  # they start while what is open is checked here
+            yield self.analysis.look_for_kept
+            yield self._call_helpers  # they start while what is open is checked here
         steps = list(self.publisher.steps())
         for number, step in enumerate(steps):
             if number == len(self.analysis.documents):  # open files are done, and questions about them come next
                 yield None
                 yield self._load_features
+                yield from self._take_kept()
                 yield from steps[:number]  # what an earlier session found is found again, for the edits to come
             while self.analysis.helpers_have_found:
                 yield self.analysis.take_over
@@ -150,6 +158,34 @@ class ClientSession:
         yield self._all_checked
         for key in self.analysis.documents:
             yield lambda key=key: self._keep(key)  # type: ignore[misc]
+
+    def _call_helpers(self) -> None:
+        if not self.analysis.has_kept:
+            self.analysis.call_helpers()
+
+    def _take_kept(self) -> Iterator[Callable[[], None]]:
+        """Take over what an earlier session has found out. Helpers are called for the rest of it."""
+        if self.analysis.has_kept:
+            while self.analysis.has_kept:
+                yield self.analysis.take_kept
+            yield self._call_helpers
+
+    def saved(self, key: str) -> None:
+        """A file was saved: later sessions begin with it as it is now."""
+        self.to_keep.add(key)
+        self._news = True
+
+    def keeps_next(self) -> bool:
+        """Whether what is known of the workspace is kept after the next check, while nothing is to be done: it takes a
+        tenth of the first check."""
+        now, whole = time.monotonic(), self.checked and self.publisher.whole_workspace
+        self._keeping = whole and self._news and now >= self._keep_from
+        if self._keeping:
+            self._keep_from = now + KEPT_BEFORE
+        return self._keeping
+
+    def _all_kept(self) -> None:
+        self._news, self._keep_from = False, time.monotonic() + KEPT_ANEW
 
     def _prepare(self, key: str) -> None:
         self.analysis.prepare(key)
@@ -170,6 +206,7 @@ class ClientSession:
     def _all_checked(self) -> None:
         self.analysis.dismiss_helpers()
         self.checked = self.analysis.settled = True
+        self._news |= not self.analysis.known_before.issuperset(self.analysis.programs())
         self._progress.end()
         memory.begin_collecting()
 

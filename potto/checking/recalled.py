@@ -1,16 +1,17 @@
-"""What commands found out about programs, kept on disk. It holds while the texts that it was read from stay the same.
+"""What was found out about programs, kept on disk. It holds while all that it was read from stays the same.
 
-Owns `Question`, what is asked of which programs. An answer is kept with the digests of all texts that were read for
-it, those of imports among them, and of files that were looked for and are not there; it is given again if each of them
-is what it was. No syntax is loaded for that. Answers that rest on anything else than the texts of programs (files of
-data, the contents of folders) are not kept, nor are those under a project file that is not understood.
+Owns `Question`, what a command asks of which programs, and `keep_said` and `said_earlier` for what is said about one
+file of a database. An answer is kept with the digests of all that was read for it, what imports lead to among it, and
+of files that were looked for and are not there; it is given again if each of them is what it was. No syntax is loaded
+for that. What commands keep rests on the texts of programs alone: nothing of data or the contents of folders, nor of a
+project file that is not understood.
 """
 
 from __future__ import annotations
 
 import os
 import stat
-from collections.abc import Hashable, Mapping
+from collections.abc import Callable, Hashable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from msgspec import Struct
@@ -21,10 +22,21 @@ from potto.projects.project import Projects
 
 if TYPE_CHECKING:
     from potto.query import Database
+    from potto.reports.render import Located
 
 KIND = "checked"
+MOST_READ = 5_000  # texts and folders that what is said about a file may rest on
 _ABSENT = b""  # the digest of a file that is not there
 _MARK = b"\xef\xbb\xbf"  # of the order of bytes, which is no part of a text
+
+
+def _given_again(key: bytes, now: Callable[[str], bytes | None]) -> Any:
+    """The answer kept under a key, if all that was read for it has the digest that it had; None if there is none."""
+    found = recall(KIND, key)
+    if found is None:
+        return None
+    reads, answer = found
+    return answer if all(now(name) == digest for name, digest in reads.items()) else None
 
 
 class Question(Struct, frozen=True):
@@ -49,11 +61,7 @@ class Question(Struct, frozen=True):
     def recalled(self) -> Any:
         """The answer that was kept; None if there is none, or a text has changed since."""
         key = self._key
-        found = None if key is None else recall(KIND, key)
-        if found is None:
-            return None
-        texts, answer = found
-        return answer if all(_on_disk(path) == digest for path, digest in texts.items()) else None
+        return None if key is None else _given_again(key, _on_disk)
 
     def keep(self, answer: object, db: Database) -> None:
         """Keep the answer that a database has led to. Texts that were put into it must follow from the question."""
@@ -93,3 +101,42 @@ def _on_disk(path: str) -> bytes | None:
 
 def _digest(text: bytes) -> bytes:
     return blake2b(text, digest_size=16).digest()
+
+
+# What is said about one file of a database
+
+
+def said_earlier(db: Database, file: str) -> tuple[Located, ...] | None:
+    """What an earlier session has said about a file, if that still holds."""
+    found: tuple[Located, ...] | None = _given_again(_said_of(file), lambda name: _in_database(db, name))
+    return found
+
+
+def keep_said(db: Database, file: str) -> None:
+    """Keep what is said about a file of which all is known. An open file and the one on disk are one text."""
+    from potto.checking.check import diagnostics
+
+    keys = db.inputs_below(diagnostics.__name__, (file,)) if os.path.isabs(file) else None
+    if keys is not None and len(keys) <= MOST_READ:
+        names = dict.fromkeys(map(_name, keys))
+        keep(KIND, _said_of(file), ({name: _in_database(db, name) for name in names}, diagnostics(db, file)))
+
+
+def _said_of(file: str) -> bytes:
+    return repr(("said of", file)).encode("utf-8", "surrogatepass")
+
+
+def _name(key: Hashable) -> str:
+    """How an input is called by what rests on it."""
+    assert isinstance(key, tuple)
+    kind, *path = key
+    return ":".join(("text" if kind in ("file", "overlay") else kind, *path))
+
+
+def _in_database(db: Database, name: str) -> bytes:
+    """The digest of what is read under a name now."""
+    from potto.modules.texts import content
+
+    kind, *path = name.split(":", 1)
+    value = content(db, path[0]) if kind == "text" else db.get_input((kind, *path))
+    return _digest(repr(value).encode("utf-8", "surrogatepass"))

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
 from potto.cli.console import Console
 
 SUMMARY = "what Potto keeps on disk between runs: where, of which kinds, how much; --clear"
 EXAMPLE = "  potto cache --clear"
-# What is kept beside the store, and where.
-_BESIDE = {"verdicts": "checked-*/*.json"}
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -21,15 +18,10 @@ def run(options: argparse.Namespace, console: Console) -> int:
     from potto import store
 
     report = store.report()
-    beside = {name: _files(report.folder, pattern) for name, pattern in _BESIDE.items()}
-    kinds = {name: (len(files), sum(path.stat().st_size for path in files)) for name, files in beside.items()}
-    kinds |= {kind.name: (kind.entries, kind.size) for kind in report.kinds}
+    kinds = {kind.name: (kind.entries, kind.size) for kind in report.kinds}
     if options.clear:
         store.clear()
-        for files in beside.values():
-            for path in files:
-                path.unlink(missing_ok=True)
-    count, size = (sum(numbers) for numbers in zip(*kinds.values()))
+    count, size = sum(kind.entries for kind in report.kinds), report.size
     if options.json:
         console.answer_json({
             "folder": None if report.folder is None else str(report.folder), "files": count, "bytes": size,
@@ -43,13 +35,9 @@ def run(options: argparse.Namespace, console: Console) -> int:
     console.answer(f"folder: {report.folder}  (POTTO_CACHE; `off` keeps nothing)")
     for name, (n, b) in {**kinds, "in all": (count, size)}.items():
         console.answer(f"  {name:<14} {n:>7,} file{' ' if n == 1 else 's'} {b / 1e6:>10,.3f} MB")
-    console.answer(f"at most {report.bound / 1e6:,.0f} MB beside verdicts  (POTTO_CACHE_MB)")
+    console.answer(f"at most {report.bound / 1e6:,.0f} MB  (POTTO_CACHE_MB)")
     if report.complaint and store.refused() is None:  # which is told of every command
         console.answer(report.complaint)
     if options.clear:
         console.answer("cleared")
     return 0
-
-
-def _files(folder: Path | None, pattern: str) -> list[Path]:
-    return [] if folder is None or not folder.is_dir() else [path for path in folder.glob(pattern) if path.is_file()]

@@ -1,16 +1,19 @@
 """Terms, and values made of them, as bytes and back: what is found out about a program can be kept.
 
 Owns `packed` and `unpacked`, and `keep` and `recall`, by which values go to the store and come back. Bytes hold data:
-numbers, strings, tuples, lists, sets, dictionaries, kinds of diagnostics by their codes, structs of Potto by the names
-of their classes, and terms, each distinct subterm once. What comes back is equal, floats to the last bit; terms are the
-very objects that there are in this process.
+numbers, strings, tuples, lists, sets, dictionaries, kinds of diagnostics by their codes, structs, dataclasses and
+named tuples of Potto by the names of their classes, and terms, each distinct subterm once. What comes back is equal,
+floats to the last bit; terms, and symbols that are `found_by` a function, are the very objects that there are in this
+process.
 """
 
 from __future__ import annotations
 
+import copyreg
 import importlib
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from dataclasses import is_dataclass
 from fractions import Fraction
 from functools import lru_cache
 from typing import Any
@@ -22,10 +25,18 @@ from potto.core.consing import Base, own_fields
 from potto.core.rebuilding import rebuilt
 from potto.core.walking import unknown
 from potto.diagnostics import KINDS, Kind
+from potto.quick import is_compiled
 
-_TUPLE, _LIST, _SET, _DICT, _TERM, _STRUCT, _KIND, _FRACTION, _INTEGER = range(9)
+_TUPLE, _LIST, _SET, _DICT, _TERM, _STRUCT, _KIND, _FRACTION, _INTEGER, _FOUND = range(10)
 _PLAIN = frozenset((type(None), bool, float, str, bytes))
 _LARGEST = 2**63
+_finders = set[Callable[..., Any]]()
+
+
+def found_by(function: Callable[..., Any]) -> None:
+    """Let what is pickled as a call of this function, as `copyreg` knows, be packed: symbols that are told by identity.
+    Its module and name lead to it."""
+    _finders.add(function)
 
 
 def packed(value: object) -> bytes:
@@ -70,15 +81,17 @@ class _Writer:
         self.kinds: list[str] = []
         self.rows: list[list[Any]] = []
         self.shapes: dict[type, tuple[int, tuple[str, ...]]] = {}
+        self.finders: dict[Callable[..., Any], int] = {}
         self.terms: dict[Any, int] = {}
 
-    def kind(self, cls: type) -> int:
-        name = f"{cls.__module__}:{cls.__qualname__}"
+    def kind(self, found: Callable[..., Any]) -> int:
+        """The number of a class, or of a function that finds symbols, under its name."""
+        name = f"{found.__module__}:{found.__qualname__}"
         try:
-            found: object = _named(name)
+            named: object = _named(name)
         except (LookupError, AttributeError, ImportError):
-            found = None
-        if found is not cls:
+            named = None
+        if named is not found:
             raise TypeError(f"{name} is not found by its name")
         self.kinds.append(name)
         return len(self.kinds) - 1
@@ -96,8 +109,7 @@ class _Writer:
         cls = type(value)
         shape = self.shapes.get(cls)
         if shape is None:
-            names = own_fields(cls) if issubclass(cls, Base) else cls.__struct_fields__
-            shape = self.shapes[cls] = self.kind(cls), names
+            shape = self.shapes[cls] = self.kind(cls), _fields(cls)
         number, names = shape
         return [number, *[self.value(getattr(value, name)) for name in names]]
 
@@ -115,7 +127,7 @@ class _Writer:
             return [_LIST, *map(self.value, value)]
         if cls is Kind:
             return [_KIND, value.code]
-        if issubclass(cls, Struct):
+        if cls in self.shapes or _is_data(cls):
             return [_STRUCT, *self.fields(value)]
         if cls is frozenset:
             return [_SET, *map(self.value, value)]
@@ -123,13 +135,23 @@ class _Writer:
             return [_DICT, *(self.value(part) for pair in value.items() for part in pair)]
         if cls is Fraction:
             return [_FRACTION, str(value)]
-        raise TypeError(f"{cls.__qualname__} is no data")
+        return self.symbol(value)
+
+    def symbol(self, value: Any) -> list[Any]:
+        """What is found by a function, by the arguments that lead to it."""
+        told: Any = copyreg.dispatch_table.get(type(value))
+        finder, arguments, *_ = (None, ()) if told is None else told(value)
+        if finder not in _finders:
+            raise TypeError(f"{type(value).__qualname__} is no data")
+        if finder not in self.finders:
+            self.finders[finder] = self.kind(finder)
+        return [_FOUND, self.finders[finder], *map(self.value, arguments)]
 
 
 class _Reader:
     """Reads one value. The first of each list says what it is."""
 
-    def __init__(self, kinds: Sequence[type]) -> None:
+    def __init__(self, kinds: Sequence[Callable[..., Any]]) -> None:
         self.kinds = kinds
         self.terms: list[Any] = []
         self.read: tuple[Callable[[list[Any]], Any], ...] = (
@@ -142,21 +164,44 @@ class _Reader:
             lambda parts: KINDS[parts[0]],
             lambda parts: Fraction(parts[0]),
             lambda parts: int(parts[0]),
+            lambda parts: self.kinds[parts[0]](*map(self.value, parts[1:])),
         )
 
     def value(self, value: Any) -> Any:
         return self.read[value[0]](value[1:]) if type(value) is list else value
 
 
+def _is_data(cls: type) -> bool:
+    """Whether values of a class are made of its fields, and compared by them."""
+    if issubclass(cls, Struct | tuple):
+        return cls is not tuple
+    return (is_dataclass(cls) or is_compiled(cls)) and cls.__eq__ is not object.__eq__
+
+
+def _fields(cls: Any) -> tuple[str, ...]:
+    """The names of the fields that make a value of this class what it is."""
+    if issubclass(cls, Base):
+        return own_fields(cls)
+    found: tuple[str, ...] = (
+        cls.__struct_fields__
+        if issubclass(cls, Struct)
+        else cls._fields
+        if issubclass(cls, tuple)
+        else cls.__match_args__
+    )
+    return found
+
+
 @lru_cache(maxsize=1024)
-def _named(name: str) -> type[Struct]:
-    """The struct of Potto of this name. Raises LookupError, AttributeError or ImportError if there is none."""
+def _named(name: str) -> Callable[..., Any]:
+    """The class of Potto's data, or the function that finds symbols, of this name. Raises LookupError, AttributeError
+    or ImportError if there is none."""
     module, _, path = name.partition(":")
     if not module.startswith("potto."):
         raise LookupError(f"{name} is none of ours")
     found: Any = importlib.import_module(module)
     for part in path.split("."):
         found = getattr(found, part)
-    if not (isinstance(found, type) and issubclass(found, Struct)):
-        raise LookupError(f"{name} is no struct")
-    return found
+    if _is_data(found) if isinstance(found, type) else found in _finders:
+        return found  # type: ignore[no-any-return]
+    raise LookupError(f"{name} is no data")

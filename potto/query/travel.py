@@ -1,12 +1,13 @@
-"""Answers that travel: what one database has found out, taken over by another one that has the same inputs.
+"""Answers that travel: what one database has found out, taken over by another one, in another process or later.
 
 Owns `Sender` and `Receiver`, the two ends of one way between two processes, and `Parcel`, what goes over it: an answer
 with all that it rests on and that was not sent before. A query says whether its answers travel
 (`@query(travels=True)`); where they don't, what it has read stands for it. That is always sound; the answers of queries
 that cut edits off should travel, so that they do so on the other side too.
 
-With each input goes a digest of its value. The receiver takes an answer over only if every input below it is the same
-here, so nothing is ever taken over that would not have been found here.
+With each input goes a digest of its value. The receiver takes an answer over only if all that it has read is the same
+here, so nothing is ever taken over that would not have been found here. Where something it has read is not, it is found
+here; if it is equal all the same, what rests on it is taken over again.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from typing import Any
 
 from potto.digests import blake2b
 from potto.query.database import Database
-from potto.query.nodes import Input, MappingEntry, Memo, Node, Query, entry_of
+from potto.query.nodes import GONE, Input, MappingEntry, Memo, Node, Query, entry_of, same
 from potto.quick import quick, value
 
 Args = tuple[Hashable, ...]
@@ -77,12 +78,15 @@ class Sender:
             return Parcel(self._views[roots[-1]][0], tuple(self._new_values), tuple(self._new))
 
     def _look_at(self, root: Memo) -> None:
-        """Visit everything that a memo depends on, from the bottom up, without recursion."""
+        """Visit everything that a memo depends on, from the bottom up, without recursion. Where a memo was verified by
+        what lies far below, what lies between may be of another time: it is brought up to date first."""
         views, stack = self._views, [root]
         while stack:
             memo = stack[-1]
             height = len(stack)
             if memo not in views:
+                if memo.verified_at < self._db.revision and memo.value is not GONE:
+                    self._db.is_current(memo)
                 for dep in memo.deps:
                     if (source := dep.source) is not None and source not in views:
                         stack.append(source)
@@ -101,12 +105,14 @@ class Sender:
                 below[number] = None
             elif isinstance(dep, Input):
                 below[self._input(dep)] = None
-            elif isinstance(dep, MappingEntry) and dep.source.query.travels:
+            elif isinstance(dep, MappingEntry) and _is_sent(dep.source):
                 below[self._number(dep, (self._views[dep.source][0], dep.key, None))] = None
             else:
                 for number in self._views[dep if isinstance(dep, Memo) else dep.source]:
                     below[number] = None
-        if not memo.query.travels:
+        if memo.value is GONE and memo.verified_at < 0 and not memo.deps:
+            raise LookupError(f"{memo!r} has failed")
+        if not _is_sent(memo):
             return tuple(below)
         query, value = self._value(address(memo.query)), self._value(memo.value)
         return (self._number(memo, (query, memo.args, value, tuple(below))),)
@@ -134,22 +140,26 @@ class Sender:
         return number
 
 
+def _is_sent(memo: Memo) -> bool:
+    """Whether an answer is sent itself, and not what it has read: it travels, and was not dropped."""
+    return memo.query.travels and memo.value is not GONE
+
+
 class Receiver:
     """Takes the parcels of one sender, in the order in which they were sent."""
 
     def __init__(self, db: Database) -> None:
         self._db = db
         self._values: list[Any] = []
-        self._nodes: list[Node | None] = []  # None: not taken over
-        self._reads: list[int] = []  # the inputs below each node, a bit for each
-        self._inputs: list[InputSent] = []
-        self._digests: dict[Hashable, tuple[int, str]] = {}
+        self._nodes: list[Node | None] = []  # as they are here; None: not to be found
+        self._there: list[Any] = []  # the value that each had there; of an input, the digest
+        self._stood: list[int] = []  # the revision in which each was looked at; less than 0 if it differed
+        self._digests: dict[Input, tuple[int, str]] = {}
         self._begun: int | None = None  # where the nodes of a parcel begin that was not taken to its end
-        self._same, self._other, self._revision = 0, 0, -1  # which inputs are the same here, in which revision
 
     def take(self, parcel: Parcel) -> bool:
-        """Take over everything that depends on nothing that differs here. Returns whether this includes the answer
-        itself.
+        """Take over everything that depends on nothing that differs here. Returns whether the answer itself is the same
+        here.
 
         After a cancellation, call it again with the same parcel: it continues where it was.
         """
@@ -157,57 +167,57 @@ class Receiver:
             if self._begun is None:
                 self._values += parcel.values
                 self._begun = len(self._nodes)
-            end = self._begun + len(parcel.nodes)
-            try:
-                for sent in parcel.nodes[len(self._nodes) - self._begun :]:
-                    node, reads = self._taken(sent)
-                    self._reads.append(reads)
-                    self._nodes.append(node)
-            except Exception:  # a query fails; whoever asks for it will see that
-                self._reads += [0] * (end - len(self._reads))
-                self._nodes += [None] * (end - len(self._nodes))
+            for sent in parcel.nodes[len(self._nodes) - self._begun :]:
+                node, there = self._taken(sent)
+                self._there.append(there)
+                self._stood.append(0)
+                self._nodes.append(node)
+            stands = self._stands(parcel.root)
             self._begun = None
-            return self._nodes[parcel.root] is not None
+            return stands
 
-    def _taken(self, sent: Sent) -> tuple[Node | None, int]:
+    def _taken(self, sent: Sent) -> tuple[Node | None, Any]:
+        """A node as it is here, and the value that it had there."""
         if len(sent) == 2:
-            self._inputs.append(sent)
-            return self._db.input(sent[0]), 1 << (len(self._inputs) - 1)
+            return self._db.input(sent[0]), sent[1]
         if len(sent) == 3:
-            table = self._nodes[sent[0]]
-            return (entry_of(table, sent[1]) if isinstance(table, Memo) else None), self._reads[sent[0]]
-        below, reads = [], 0
-        for number in sent[3]:
-            node = self._nodes[number]
-            if node is None:
-                return None, 0
-            below.append(node)
-            reads |= self._reads[number]
-        if not self._holds(reads) or not all(map(self._db.is_current, below)):
-            return None, 0
-        module, name = self._values[sent[0]]
-        return self._db.adopt(getattr(import_module(module), name), sent[1], self._values[sent[2]], below), reads
+            number, key, _ = sent
+            table = self._nodes[number]
+            entry = entry_of(table, key) if isinstance(table, Memo) and self._is_current(table) else None
+            return entry, self._there[number].get(key)
+        (module, name), there = self._values[sent[0]], self._values[sent[2]]
+        query = getattr(import_module(module), name)
+        if all(map(self._stands, sent[3])):
+            below = [node for number in sent[3] if (node := self._nodes[number]) is not None]
+            return self._db.adopt(query, sent[1], there, below), there
+        try:
+            return self._db.memo(query, sent[1]), there
+        except Exception:  # whoever asks for it will see that
+            return None, there
 
-    def _holds(self, reads: int) -> bool:
-        """Whether these inputs are the same here."""
-        if self._revision != self._db.revision:
-            self._same, self._other, self._revision = 0, 0, self._db.revision
-        open_ = reads & ~self._same
-        while open_ and not reads & self._other:
-            bit = open_ & -open_
-            open_ ^= bit
-            key, claimed = self._inputs[bit.bit_length() - 1]
-            if self._digest(key) == claimed:
-                self._same |= bit
-            else:
-                self._other |= bit
-        return not reads & self._other
+    def _stands(self, number: int) -> bool:
+        """Whether a node is here what it was there."""
+        revision = self._db.revision
+        if abs(self._stood[number]) != revision:
+            self._stood[number] = revision if self._is_same(self._nodes[number], self._there[number]) else -revision
+        return self._stood[number] > 0
 
-    def _digest(self, key: Hashable) -> str:
-        node = self._db.input(key)
-        known = self._digests.get(key)
+    def _is_same(self, node: Node | None, there: Any) -> bool:
+        if node is None or not self._is_current(node):
+            return False
+        return self._digest(node) == there if isinstance(node, Input) else same(node.value, there)
+
+    def _is_current(self, node: Node) -> bool:
+        """Whether a node is in use here. It is up to date then."""
+        try:
+            return self._db.is_current(node) and node.value is not GONE
+        except Exception:
+            return False
+
+    def _digest(self, node: Input) -> str:
+        known = self._digests.get(node)
         if known is None or known[0] != node.changed_at:
-            known = self._digests[key] = (node.changed_at, digest(node.value))
+            known = self._digests[node] = (node.changed_at, digest(node.value))
         return known[1]
 
 

@@ -8,12 +8,13 @@ question of its own (`queries.plain_reasons`), asked only when a message is buil
 from __future__ import annotations
 
 import copyreg
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cache, lru_cache
 from operator import attrgetter
-from typing import Any
+from typing import Any, Literal
 
+from potto.core.packing import found_by
 from potto.modules.lookup import DefinitionTarget
 from potto.quick import quick, replace
 from potto.types.algebra import flat, inputs_of, inputs_of_ports, join, ports_in
@@ -131,32 +132,32 @@ VARYING = Source("variable", "", number=-2)
 _NAMED = {"HAZE": HAZE, "VARYING": VARYING}
 
 
-def _symbol(kind: type, *made_of: Any) -> Any:
+def _symbol(kind: Literal["named", "source", "port", "sink"], *made_of: Any) -> Any:
     """The one symbol of an interface that there is in this process, from what is told of it to another one."""
-    if kind is str:
-        return _NAMED[made_of[0]]
-    return {Source: _source, Port: _port, Sink: _sink}[kind](*made_of)
+    find: dict[str, Callable[..., Any]] = {"named": _NAMED.__getitem__, "source": _source, "port": _port, "sink": _sink}
+    return find[kind](*made_of)
 
 
 def _told(symbol: Any) -> tuple[Any, ...]:
     """How a symbol is pickled. Those of interfaces are told by their numbers, for they are compared by identity."""
     for name, named in _NAMED.items():
         if symbol is named:
-            return _symbol, (str, name)
+            return _symbol, ("named", name)
     if isinstance(symbol, Sink):
         if symbol is _sink(symbol.kind, symbol.number):
-            return _symbol, (Sink, symbol.kind, symbol.number)
+            return _symbol, ("sink", symbol.kind, symbol.number)
         return Sink, (symbol.kind, symbol.span, symbol.number, symbol.origin, symbol.node)
     if isinstance(symbol, Source):
         if symbol is _source(symbol.number):
-            return _symbol, (Source, symbol.number)
+            return _symbol, ("source", symbol.number)
         return Source, (symbol.kind, symbol.name, symbol.span, symbol.number, symbol.origin)
     assert isinstance(symbol, Port)
     if symbol is _port(symbol.number):
-        return _symbol, (Port, symbol.number)
+        return _symbol, ("port", symbol.number)
     return Port, (symbol.name, symbol.number, symbol.origin)
 
 
+found_by(_symbol)
 for _kind in (Source, Port, Sink):
     copyreg.pickle(_kind, _told)
 

@@ -98,8 +98,48 @@ def test_what_was_refused_is_found_here() -> None:
     here.set_input(("text", "b"), "another")
     assert not sent(sender, receiver, "a", "b")
     here.set_input(("text", "b"), "our")
-    assert not sent(sender, receiver, "a", "b")  # what was refused once is found here
-    assert ran(here, "a", "b")[0] == 3 + 3 + 3
+    assert sent(sender, receiver, "a", "b")  # what was refused once is found here, and is the same
+    assert ran(here, "a", "b") == (3 + 3 + 3, [])
+
+
+def test_what_differs_below_is_found_here_and_cuts_the_difference_off() -> None:
+    there, here = database(a="one two", b="our three"), database(a="two   one", b="our three")
+    with here.recording() as events:
+        assert sent(Sender(there), Receiver(here), "a", "b")
+    assert [f"{event.query} {' '.join(event.args)}" for event in events if event.kind == "executed"] == [  # type: ignore[arg-type]
+        "words a", "text a"
+    ]  # fmt: skip
+    assert ran(here, "a", "b") == (3 + 5 + 3, [])
+
+
+def test_an_entry_is_the_same_where_its_table_is_not() -> None:
+    there, here = database(a="our two"), database(a="our three")
+    assert Receiver(here).take(Sender(there).pack(ours, "a"))
+    with here.recording() as events:
+        assert ours(here, "a") == 3
+    assert not [event for event in events if event.kind == "executed"]
+
+
+def test_what_lies_between_is_sent_as_it_is_now() -> None:
+    """An edit that is taken back: the sum is recalled, and what it was made from is not looked at."""
+    there, here = database(a="one two", b="our"), database(a="one two", b="our")
+    for text in ("four", "one two"):
+        there.set_input(("text", "a"), text)
+        total(there, "a", "b")
+    assert sent(Sender(there), Receiver(here), "a", "b")
+    for name in "ab":
+        assert words(here, name) == words(database(a="one two", b="our"), name)
+    assert ran(here, "a", "b") == (3 + 3 + 3, [])
+
+
+def test_what_was_dropped_is_not_sent() -> None:
+    there, here = database(a="one two", b="our"), database(a="one two", b="our")
+    total(there, "a", "b")
+    assert there.forget(lambda name, args: name in ("words", "longest")) == 4
+    assert sent(Sender(there), Receiver(here), "a", "b")
+    assert total(here, "a", "b") == 3 + 3 + 3
+    here.set_input(("text", "b"), "another")
+    assert total(here, "a", "b") == 3 + 7
 
 
 def test_what_is_known_here_stays() -> None:

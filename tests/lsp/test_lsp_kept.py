@@ -1,9 +1,7 @@
-"""What was said in an earlier session: told at once while it holds, and never when it does not."""
+"""What was found out in an earlier session: told at once while it holds, and never when it does not."""
 
 from __future__ import annotations
 
-import json
-import os
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -14,8 +12,8 @@ from potto_lsp.analysis import Analysis
 from potto_lsp.documents import Document
 from potto_lsp.text import DocumentText
 from potto_lsp.uris import to_uri
-from potto_lsp.verdicts import FOLDER, Verdicts, program_digest
 
+from potto.checking.recalled import said_earlier
 from potto.reports.render import Located
 
 PUSHED = "textDocument/publishDiagnostics"
@@ -25,10 +23,10 @@ MAIN = "from lib import step\nfrom lib import nothing\ndef f(t) integral [0, 1] 
 
 @pytest.fixture
 def cache(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """A cache folder of its own, in which verdicts are."""
+    """A store of its own: the folder of what was said about single files."""
     folder = tmp_path_factory.mktemp("cache")
     monkeypatch.setenv("POTTO_CACHE", str(folder))
-    yield folder / f"{FOLDER}{program_digest()}"
+    yield folder / "store" / "checked"
 
 
 @pytest.fixture
@@ -49,8 +47,7 @@ def session(folder: Path, text: str = MAIN) -> Analysis:
 
 def known(folder: Path, text: str = MAIN) -> tuple[Located, ...] | None:
     """What a new session knows of `main` without checking it."""
-    made = session(folder, text)
-    return Verdicts(made.db).of(str(folder / "main.po"))
+    return said_earlier(session(folder, text).db, str(folder / "main.po"))
 
 
 def checked(folder: Path) -> tuple[Located, ...]:
@@ -101,27 +98,16 @@ def test_a_file_that_has_nothing_to_do_with_it_changes_nothing(cache: Path, fold
 
 def test_what_is_not_whole_or_not_ours_is_not_there(cache: Path, folder: Path) -> None:
     found = checked(folder)
-    (path,) = cache.glob("*.json")
-    whole = path.read_text()
-    data = json.loads(whole)
-    wrong = [
-        "", "{", "[]", "3", '{"file": 1}', "[" * 100_000, whole[: len(whole) // 2], "\x00" * 10,
-        json.dumps({**data, "file": "/other.po"}), json.dumps({**data, "reads": {}}), json.dumps({**data, "reads": 3}),
-        json.dumps({**data, "found": [{**data["found"][0], "code": "Q1"}]}),
-        json.dumps({**data, "found": [{**data["found"][0], "severity": "fatal"}]}),
-        json.dumps({**data, "found": [{**data["found"][0], "span": [5, 2]}]}),
-        json.dumps({**data, "found": [{**data["found"][0], "related": [1]}]}),
-        json.dumps({**data, "found": "x"}),
-    ]  # fmt: skip
-    for text in wrong:
-        path.write_text(text)
-        assert known(folder) is None, text[:80]
-    path.write_text(whole)
+    (path,) = cache.iterdir()
+    whole = path.read_bytes()
+    wrong = [b"", b"{", whole[: len(whole) // 2], b"\0" * 10, whole[:-1] + bytes([whole[-1] ^ 1]), whole + b"\0"]
+    for data in wrong:
+        path.write_bytes(data)
+        assert known(folder) is None, data[:80]
+    path.write_bytes(whole)
     assert known(folder) == found
-    cache.chmod(0o777)
-    assert known(folder) is None, "others could have written it"
-    cache.chmod(0o700)
-    assert known(folder) == found
+    path.rename(path.with_name("0" * 64))
+    assert known(folder) is None, "it is said of another file"
 
 
 def test_where_nothing_can_be_written_nothing_is_kept(
@@ -133,15 +119,6 @@ def test_where_nothing_can_be_written_nothing_is_kept(
     assert known(folder) is None
 
 
-def test_verdicts_of_other_versions_are_deleted(cache: Path, folder: Path) -> None:
-    other = cache.parent / f"{FOLDER}0123"
-    other.mkdir(parents=True)
-    (other / "a.json").write_text("{}")
-    checked(folder)
-    assert not other.exists() and len(list(cache.iterdir())) == 1
-    assert os.stat(cache).st_mode & 0o077 == 0
-
-
 def test_a_server_tells_what_an_earlier_one_has_found(cache: Path, folder: Path) -> None:
     uri = (folder / "main.po").as_uri()
     told = []
@@ -150,8 +127,67 @@ def test_a_server_tells_what_an_earlier_one_has_found(cache: Path, folder: Path)
         client.start()
         client.open(uri, MAIN)
         told.append(client.note(PUSHED, uri=uri, version=1)["diagnostics"])
-        until = time.monotonic() + 20
-        while not list(cache.glob("*.json")) and time.monotonic() < until:
-            time.sleep(0.05)
+        wait_for(cache)
         client.process.kill()
     assert told[0] == told[1] and len(told[0]) >= 3
+
+
+def wait_for(folder: Path) -> None:
+    """Wait until something was kept."""
+    until = time.monotonic() + 20
+    while not (folder.is_dir() and list(folder.iterdir())) and time.monotonic() < until:
+        time.sleep(0.05)
+
+
+def test_a_server_keeps_what_it_knows_of_the_workspace_and_begins_with_it(cache: Path, folder: Path) -> None:
+    """Closed files are told of by an earlier session's answers, the edited one among them by its own."""
+    wrong = "from lib import step\ndef g(t) step(t, t)\n"
+    (folder / "closed.po").write_text(wrong)
+    (folder / "edited.po").write_text(wrong)
+    uris = [(folder / name).as_uri() for name in ("closed.po", "edited.po", "main.po")]
+    for turn in range(2):
+        client = Client(folder)
+        client.start()
+        client.open(uris[2], MAIN)
+        told = [len(client.note(PUSHED, uri=uri)["diagnostics"]) for uri in uris[:2]]
+        assert told == [1, 1 + turn]
+        wait_for(cache.parent / "workspaces")
+        client.process.kill()
+        (folder / "edited.po").write_text(wrong + "def h(t) step(t, t)\n")
+
+
+def analysed(made: Analysis) -> set[str]:
+    """The files in which definitions are analysed when all are asked for."""
+    with made.db.recording() as events:
+        for key in made.programs():
+            made.diagnostics(key)
+    groups = [event.args[0] for event in events if event.query == "_analyses" and event.kind == "executed"]
+    return {Path(target.file).name for group in groups for target in group}  # type: ignore[attr-defined]
+
+
+def test_a_session_takes_over_what_an_earlier_one_has_kept(cache: Path, folder: Path) -> None:
+    def kept() -> None:
+        done.append(True)
+
+    done: list[bool] = []
+    earlier = session(folder)
+    assert analysed(earlier) == {"lib.po", "main.po"}
+    for step in earlier.keep_all(kept):
+        step()
+    assert done
+    later = session(folder)
+    later.look_for_kept()
+    while later.has_kept:
+        later.take_kept()
+    assert later.known_before == set(later.programs()) == later.taken
+    later.settled = True  # nothing more is told from what was said of single files
+    assert analysed(later) == set()
+    assert [later.diagnostics(key) for key in later.programs()] == [earlier.diagnostics(k) for k in earlier.programs()]
+    edited = session(folder, MAIN.replace("unknown", "f"))
+    edited.look_for_kept()
+    while edited.has_kept:
+        edited.take_kept()
+    alone = session(folder, MAIN.replace("unknown", "f"))
+    assert edited.known_before == {str(folder / "lib.po")}
+    assert analysed(edited) <= {"main.po"}
+    assert [edited.diagnostics(key) for key in edited.programs()] == [alone.diagnostics(k) for k in alone.programs()]
