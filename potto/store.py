@@ -224,7 +224,7 @@ def _sources(folder: str) -> Iterator[tuple[str, os.stat_result]]:
 def _name(kind: str, key: bytes) -> str:
     """The name of an entry's file. Raises ValueError for a kind that could not be the name of a folder."""
     if not _KIND.fullmatch(kind):
-        raise ValueError(f"{kind!r} is no kind of entry: small letters and hyphens")
+        raise ValueError(f"{kind!r} is not a kind of entry: small letters and hyphens")
     digest = blake2b(program(), digest_size=_DIGEST)
     digest.update(kind.encode() + b"\0")
     digest.update(key)

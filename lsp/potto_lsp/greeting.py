@@ -17,7 +17,7 @@ from potto_lsp.wire import Outbox
 
 
 def answer(params: Any) -> dict[str, Any]:
-    """What the server can do, for a client. Raises `RequestError` if `params` are no greeting."""
+    """What the server can do, for a client. Raises `RequestError` if `params` are not a greeting."""
     if not isinstance(params, Mapping) or not isinstance(params.get("capabilities", {}), Mapping):
         raise RequestError(errors.INVALID_PARAMS, "the client's capabilities are missing")
     info = {"name": "potto", "version": __version__}

@@ -156,7 +156,7 @@ class Publisher:
         return {"uri": self._analysis.uri(key), "version": version, **self.answer(key, previous)}
 
     def gone(self, known: Iterable[str]) -> list[dict[str, Any]]:
-        """Empty reports for files that a client knows, or may still show, and that are no programs any more.
+        """Empty reports for files that a client knows, or may still show, and that are not programs any longer.
 
         A client that asks for a file one last time before it closes it keeps showing that answer until it hears of the
         file again, without telling us. So files that were deleted or renamed while open are listed every time.

@@ -75,7 +75,7 @@ def _header(stream: BinaryIO) -> int | None:
             if colon and name.strip().lower() == b"content-length":
                 length = _length(value)
             elif _OF_A_BROWSER.match(line):
-                logger.error("a browser is no client: %r", line[:80])
+                logger.error("a browser is not a client: %r", line[:80])
                 return None
             elif not colon:
                 logger.error("a line that is not a header field: %r", line[:80])

@@ -49,7 +49,7 @@ def hessian(function: Function, wrt: Names = None) -> Callable[..., Estimate]:
     """All second derivatives of a function that gives one number, by the parameters in `wrt`, or by the first one.
 
     `value` and `error` have the shape (*batch, parameters, parameters): batch is what arrays broadcast to, and there
-    are no axes where one parameter is named that is one number. Raises as `hvp` does, and for a tuple.
+    are not axes where one parameter is named that is one number. Raises as `hvp` does, and for a tuple.
     """
     names = parameters_to_vary(function, wrt)
     twice = _twice(function, names)

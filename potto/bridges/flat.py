@@ -1,7 +1,7 @@
 """A function of Potto as one of rows of numbers: what all bridges have in common.
 
-Owns `Flat` and `Leaf`. The parameters that a bridge passes on are rows of numbers, (*batch, numbers), and so are the
-answers: values (*batch, answers), slopes (*batch, answers, moving), curvatures (*batch, answers, moving, moving). How
+Owns `FlatFunction` and `Leaf`. The parameters that a bridge passes on are rows of numbers, (*batch, numbers), and so
+are the answers: values (*batch, answers), slopes (*batch, answers, moving), curvatures (*batch, answers, moving, moving). How
 rows are put together from arguments is the library's own work, so that it differentiates that itself; one batch, of
 whatever shape, is one call of Potto.
 """
@@ -40,7 +40,7 @@ class Leaf:
     items: int = 0
 
 
-class Flat:
+class FlatFunction:
     """A function of Potto of rows of numbers. The order of numbers is that of the leaves.
 
     moving: the leaves that are differentiated by. still: the others.

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from potto.bridges.flat import Flat, Leaf, Shapes
+from potto.bridges.flat import FlatFunction, Leaf, Shapes
 from potto.extras import install_command
 from potto.kernels.errors import wrong_call
 from potto.python.functions import Function
@@ -43,7 +43,7 @@ def to_jax(
         import jax
     except ImportError:
         raise wrong_call("JAX is not installed", install_command("jax")) from None
-    flat = Flat(function, wrt, given)
+    flat = FlatFunction(function, wrt, given)
     answer = _rules(flat, jax)
 
     def called(*args: Any, **kwargs: Any) -> Any:
@@ -58,7 +58,7 @@ def to_jax(
     return called
 
 
-def _rows(leaves: Sequence[Leaf], flat: Flat, named: Mapping[str, Any], jax: Any) -> tuple[Shapes, list[Any]]:
+def _rows(leaves: Sequence[Leaf], flat: FlatFunction, named: Mapping[str, Any], jax: Any) -> tuple[Shapes, list[Any]]:
     """The arrays of leaves, and the shape of each without a batch."""
     numpy = jax.numpy
     named = {name: jax.tree.map(numpy.asarray, argument) for name, argument in named.items()}
@@ -80,7 +80,7 @@ def _joined(shapes: Shapes, parts: Sequence[Any], batch: tuple[int, ...], dtype:
     return numpy.concatenate(rows, axis=-1) if rows else numpy.zeros((*batch, 0), dtype)
 
 
-def _rules(flat: Flat, jax: Any) -> Callable[[Sizes, Any, Any], Any]:
+def _rules(flat: FlatFunction, jax: Any) -> Callable[[Sizes, Any, Any], Any]:
     """The function of rows, with the rule for its tangents, and for theirs."""
 
     def ask(question: Callable[..., Any], axes: Callable[[int], list[tuple[int, ...]]]) -> Callable[..., Any]:

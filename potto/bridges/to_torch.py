@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from potto.bridges.flat import Flat, Leaf, Shapes
+from potto.bridges.flat import FlatFunction, Leaf, Shapes
 from potto.extras import install_command
 from potto.kernels.errors import wrong_call
 from potto.python.functions import Function
@@ -40,7 +40,7 @@ def to_torch(
         import torch
     except ImportError:
         raise wrong_call("PyTorch is not installed", install_command("torch")) from None
-    flat = Flat(function, wrt, given)
+    flat = FlatFunction(function, wrt, given)
     answer = _functions(torch)
 
     @torch.compiler.disable  # type: ignore[untyped-decorator]
@@ -77,7 +77,7 @@ def _tensors(arguments: Any) -> Any:
 
 
 def _rows(
-    leaves: Sequence[Leaf], flat: Flat, named: Mapping[str, Any], like: Any, torch: Any
+    leaves: Sequence[Leaf], flat: FlatFunction, named: Mapping[str, Any], like: Any, torch: Any
 ) -> tuple[Shapes, list[Any]]:
     """The tensors of leaves, and the shape of each without a batch."""
 
@@ -112,7 +112,7 @@ def _functions(torch: Any) -> Callable[..., Any]:
     """Values, as autograd is to see them: classes that inherit from those of PyTorch, which is imported when it is
     asked for; so all of them are made in here."""
 
-    def asked(question: str, moving: Any, still: Any, flat: Flat, sizes: Any) -> tuple[Any, ...]:
+    def asked(question: str, moving: Any, still: Any, flat: FlatFunction, sizes: Any) -> tuple[Any, ...]:
         rows = (tensor.detach().to("cpu", torch.float64).numpy() for tensor in (moving, still))
         return tuple(torch.from_numpy(part.copy()).to(moving) for part in getattr(flat, question)(sizes, *rows))
 
@@ -127,7 +127,7 @@ def _functions(torch: Any) -> Callable[..., Any]:
             ctx.set_materialize_grads(False)
             ctx.mark_non_differentiable(output[1])
 
-    def batched(kind: Any, info: Any, dims: Any, moving: Any, still: Any, flat: Flat, sizes: Any) -> Any:
+    def batched(kind: Any, info: Any, dims: Any, moving: Any, still: Any, flat: FlatFunction, sizes: Any) -> Any:
         rows = [
             tensor.expand(info.batch_size, *tensor.shape) if dim is None else tensor.movedim(dim, 0)
             for tensor, dim in zip((moving, still), dims)
@@ -137,7 +137,7 @@ def _functions(torch: Any) -> Callable[..., Any]:
 
     class Curvatures(Rows):
         @staticmethod
-        def forward(moving: Any, still: Any, flat: Flat, sizes: Any) -> Any:
+        def forward(moving: Any, still: Any, flat: FlatFunction, sizes: Any) -> Any:
             return asked("curvatures", moving, still, flat, sizes)
 
         @staticmethod
@@ -154,7 +154,7 @@ def _functions(torch: Any) -> Callable[..., Any]:
 
     class Slopes(Rows):
         @staticmethod
-        def forward(moving: Any, still: Any, flat: Flat, sizes: Any) -> Any:
+        def forward(moving: Any, still: Any, flat: FlatFunction, sizes: Any) -> Any:
             return asked("slopes", moving, still, flat, sizes)
 
         @staticmethod
@@ -179,7 +179,7 @@ def _functions(torch: Any) -> Callable[..., Any]:
 
     class Values(Rows):
         @staticmethod
-        def forward(moving: Any, still: Any, flat: Flat, sizes: Any) -> Any:
+        def forward(moving: Any, still: Any, flat: FlatFunction, sizes: Any) -> Any:
             return asked("values", moving, still, flat, sizes)
 
         @staticmethod

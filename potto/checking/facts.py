@@ -181,7 +181,7 @@ def _integral_facts(found: IntegralText) -> PartFacts:
 
 
 def _body_facts(term: Term, found: DerivativeText, fields: Rewrite) -> PartFacts:
-    """A body that is no integral by itself; what it is around its integrals is seen in the whole derivative."""
+    """A body that is not an integral by itself; what it is around its integrals is seen in the whole derivative."""
     while isinstance(term, Lam):
         term = term.body
     interior = "" if found.integrals else found.smooth

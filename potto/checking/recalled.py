@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 KIND = "checked"
 MOST_READ = 5_000  # texts and folders that what is said about a file may rest on
 _ABSENT = b""  # the digest of a file that is not there
-_MARK = b"\xef\xbb\xbf"  # of the order of bytes, which is no part of a text
+_MARK = b"\xef\xbb\xbf"  # of the order of bytes, which is not part of a text
 
 
 def _given_again(key: bytes, now: Callable[[str], bytes | None]) -> Any:
@@ -47,7 +47,7 @@ class Question(Struct, frozen=True):
 
     @property
     def _key(self) -> bytes | None:
-        """All that the answer depends on beside texts; None where a path is no file, so that what it
+        """All that the answer depends on beside texts; None where a path is not a file, so that what it
         stands for may change, or a project file is not understood."""
         if not all(path != "-" and os.path.isfile(path) for path in self.paths):
             return None
@@ -87,7 +87,7 @@ def _texts(db: Database) -> Mapping[str, bytes] | None:
 
 
 def _on_disk(path: str) -> bytes | None:
-    """The digest of a file as it is now; None of what is there and is no file that can be read."""
+    """The digest of a file as it is now; None of what is there and is not a file that can be read."""
     try:
         if not stat.S_ISREG(os.stat(path).st_mode):  # reading a pipe might never end
             return None

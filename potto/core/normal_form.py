@@ -1,6 +1,6 @@
 """Terms as polynomials with exact rational coefficients, over atoms with whole exponents.
 
-Owns `normal_form` and `as_term`. Atoms are variables, named constants and whatever is no polynomial (with its own
+Owns `normal_form` and `as_term`. Atoms are variables, named constants and whatever is not a polynomial (with its own
 parts brought to normal form first). Monomials are sorted by degree, then by name, so that terms which differ in the
 order of sums and products only have one normal form. Coefficients are fractions: nothing is rounded and nothing
 overflows.

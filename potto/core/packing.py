@@ -40,7 +40,7 @@ def found_by(function: Callable[..., Any]) -> None:
 
 
 def packed(value: object) -> bytes:
-    """A value as bytes. Raises TypeError where something in it is no data (a function, an array)."""
+    """A value as bytes. Raises TypeError where something in it is not data (a function, an array)."""
     writer = _Writer()
     root = writer.value(value)
     return msgpack.encode([writer.kinds, writer.rows, root])
@@ -59,7 +59,7 @@ def unpacked(data: bytes) -> Any:
 
 
 def keep(kind: str, key: bytes, value: object) -> None:
-    """Keep a value on disk under a key; one that is no data is not kept."""
+    """Keep a value on disk under a key; one that is not data is not kept."""
     if store.is_on():
         with suppress(TypeError, RecursionError):
             store.put(kind, key, packed(value))
@@ -142,7 +142,7 @@ class _Writer:
         told: Any = copyreg.dispatch_table.get(type(value))
         finder, arguments, *_ = (None, ()) if told is None else told(value)
         if finder not in _finders:
-            raise TypeError(f"{type(value).__qualname__} is no data")
+            raise TypeError(f"{type(value).__qualname__} is not data")
         if finder not in self.finders:
             self.finders[finder] = self.kind(finder)
         return [_FOUND, self.finders[finder], *map(self.value, arguments)]
@@ -204,4 +204,4 @@ def _named(name: str) -> Callable[..., Any]:
         found = getattr(found, part)
     if _is_data(found) if isinstance(found, type) else found in _finders:
         return found  # type: ignore[no-any-return]
-    raise LookupError(f"{name} is no data")
+    raise LookupError(f"{name} is not data")

@@ -12,7 +12,7 @@ from threading import Lock, Thread
 from types import TracebackType
 
 from potto.crew.helper import serve
-from potto.crew.pipes import Checked, CheckTask, Part, packed, unpacked
+from potto.crew.pipes import CheckResult, CheckTask, Part, packed, unpacked
 from potto.crew.processes import begun, can_be_copied
 from potto.query import Database
 from potto.query.travel import Receiver
@@ -62,8 +62,8 @@ class Crew:
         whole: list[Part] = [(file, None) for file in files]
         self._left = dict.fromkeys([*whole, *pieces])  # what nobody has begun
         self._lock = Lock()
-        self._found: SimpleQueue[tuple[_Helper, Checked]] = SimpleQueue()
-        self._taking: tuple[_Helper, Checked] | None = None
+        self._found: SimpleQueue[tuple[_Helper, CheckResult]] = SimpleQueue()
+        self._taking: tuple[_Helper, CheckResult] | None = None
         self._receivers: dict[tuple[_Helper, int], Receiver] = {}
         self._helpers: list[_Helper] = []
         self.texts = texts or {}  # of open files, to be replaced when they change

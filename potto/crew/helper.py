@@ -10,7 +10,7 @@ from threading import Thread
 from typing import BinaryIO
 
 from potto.checking.check import check_ahead, diagnostics
-from potto.crew.pipes import Checked, CheckTask, Part, packed, unpacked
+from potto.crew.pipes import CheckResult, CheckTask, Part, packed, unpacked
 from potto.modules import open_files
 from potto.modules.misread import piece_diagnostics
 from potto.modules.texts import is_diffeo
@@ -67,10 +67,10 @@ class Helper:
         """What there is to say about a file, or a piece of it, as a message."""
         file, piece = part
         try:
-            return packed(Checked(part, self._round, self._sender.pack_all(_asked(file, piece))))
+            return packed(CheckResult(part, self._round, self._sender.pack_all(_asked(file, piece))))
         except Exception:  # whoever asked checks it and meets it there
             self._begin_anew()
-            return packed(Checked(part, self._round, None))
+            return packed(CheckResult(part, self._round, None))
 
 
 def _asked(file: str, piece: str | None) -> list[Asked]:

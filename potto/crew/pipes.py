@@ -23,7 +23,7 @@ class CheckTask(Struct, frozen=True):
     texts: tuple[tuple[str, str | None], ...]
 
 
-class Checked(Struct, frozen=True):
+class CheckResult(Struct, frozen=True):
     """What was found out; no parcel if that failed. `round`: after an edit both ends begin anew."""
 
     part: Part
@@ -31,7 +31,7 @@ class Checked(Struct, frozen=True):
     parcel: Parcel | None
 
 
-def packed(message: CheckTask | Checked) -> bytes:
+def packed(message: CheckTask | CheckResult) -> bytes:
     """A message as bytes. Raises what pickling raises, for what is nested too deeply."""
     body = pickle.dumps(message, pickle.HIGHEST_PROTOCOL)
     return len(body).to_bytes(LENGTH, "little") + body

@@ -203,7 +203,7 @@ def _ragged(box: _Box) -> DataRefused:
 
 
 def _odd(box: _Box) -> DataRefused:
-    """What is said of the first entry that is of another kind than those before it, or is no number."""
+    """What is said of the first entry that is of another kind than those before it, or is not a number."""
     first, kinds = box.entries[0], (float, list, dict)
     usual = next((kind for kind in kinds if isinstance(first, kind)), float)
     at = next(at for at, entry in enumerate(box.entries) if not isinstance(entry, usual))

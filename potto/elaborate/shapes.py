@@ -68,7 +68,7 @@ class Shapes:
         self.meets_records = False  # whether some are made
 
     def of(self, term: Term) -> Type:
-        """The type of a term; of what is no composite, a number."""
+        """The type of a term; of what is not a composite, a number."""
         if type(term) in PLAIN:  # as most are
             return REAL
         found = self.known.get(term)

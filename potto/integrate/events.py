@@ -49,7 +49,7 @@ class TwoSided(Event, frozen=True):
 
     fold: or its sections along the variable appear or merge just here. Without a surface: some run along the variable.
     along: or it is there all along the variable. kink: it is a kink of the integrand's; without a variable, a number's,
-    which jumps there if it is no kink.
+    which jumps there if it is not a kink.
     hidden: rounding hides whether the surface lies there, and what that changes is part of the errors.
     """
 

@@ -17,7 +17,7 @@ from potto.calculus.decomposition.surface_cuts import ConicRegion, Cut
 from potto.calculus.decomposition.sweep import Level
 from potto.core.terms import INF, Lam, Term, function_of, neg, postorder, prim, tuple_
 
-# What the places are that are no cuts, of which none has a number below 0: hints, and such with which no nodes move.
+# What the places are that are not cuts, of which none has a number below 0: hints, and such with which no nodes move.
 HINT, RESTING = -1, -2
 NOTHING = function_of(tuple_(()))
 MANY_WALLS = 4  # from which on it is found out between which two of them something is integrated

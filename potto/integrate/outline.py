@@ -55,7 +55,7 @@ class Outline(Struct, frozen=True, dict=True):
 
     @cached_property
     def packed(self) -> bytes:
-        """As bytes. Raises TypeError where something in it is no data."""
+        """As bytes. Raises TypeError where something in it is not data."""
         return packed(self)
 
 

@@ -81,7 +81,7 @@ class Plan(Struct, frozen=True, dict=True):
     def packed(self) -> bytes:
         """As bytes; those of the outline are made once. Of the integrand with calls carried out they tell whether there
         is one: it is made in the time in which it is read, and so are its straight terms. Raises TypeError where
-        something in it is no data."""
+        something in it is not data."""
         apart = ("outline", "inlined", "straight")
         own = {name: getattr(self, name) for name in self.__struct_fields__ if name not in apart}
         return packed([self.outline.packed, self.inlined is not None, own])

@@ -181,7 +181,7 @@ class FlatLines:
         return self.binary("mul", self.constant(UNIT_ROUNDOFF), self.size(value))
 
     def rounded_sum(self, value: Flat, first: Flat, *rest: Flat) -> Flat:
-        """Where a sum is not finite, its error is no number here: the general way says what it is."""
+        """Where a sum is not finite, its error is not a number here: the general way says what it is."""
         off, total = self.rounded(value), first
         for arg in rest[:-1]:
             longer = self.binary("add", total, arg)

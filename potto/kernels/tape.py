@@ -111,7 +111,7 @@ class Node:
 
 
 def linear(*edges: tuple[Any, Any, Any], kept: bool = False, fixed: bool = False) -> Any:
-    """The sum of (slope, tangent, what the slope is off); what is no node is 0. kept, fixed: as of `Edge`."""
+    """The sum of (slope, tangent, what the slope is off); what is not a node is 0. kept, fixed: as of `Edge`."""
     made: list[Edge] = []
     shape: Shape = ()
     for slope, parent, off in edges:

@@ -32,8 +32,8 @@ class Measure(Struct, frozen=True):
         depends on them. In ascending order.
     discrete: whether it is one of whole numbers: the support is the first and the last of them, the density the chance
         of each, and an expectation a sum.
-    cdf: the integral of the density up to x; None if it is no formula of builtins.
-    quantile: the inverse of the cdf; None if it is no formula of builtins.
+    cdf: the integral of the density up to x; None if it is not a formula of builtins.
+    quantile: the inverse of the cdf; None if it is not a formula of builtins.
     mean, variance: None where they do not exist.
     valid: conditions that the parameters must meet.
     domain: per parameter an interval in which tests may sample it; they discard what is not valid.

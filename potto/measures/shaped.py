@@ -1,4 +1,4 @@
-"""Measures whose shape is a parameter: beta, gamma, Student's t. Their cdf is no formula of builtins."""
+"""Measures whose shape is a parameter: beta, gamma, Student's t. Their cdf is not a formula of builtins."""
 
 from __future__ import annotations
 

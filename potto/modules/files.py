@@ -83,7 +83,7 @@ def stamp_of(path: str) -> Stamp:
 
 
 def decode(data: bytes) -> str | Unreadable:
-    """The text of a file's bytes: UTF-8, with or without a byte order mark (which is no part of the text)."""
+    """The text of a file's bytes: UTF-8, with or without a byte order mark (which is not part of the text)."""
     for mark, name in ((b"\xff\xfe", "UTF-16"), (b"\xfe\xff", "UTF-16")):
         if data.startswith(mark):
             return Unreadable("not text", f"it begins like a file in {name}", 0)

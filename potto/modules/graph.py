@@ -110,7 +110,7 @@ def refer(db: Database, file: str, path: str | None, name: str) -> Target | None
 
 
 def owner(db: Database, file: str, path: str) -> DefinitionTarget | None:
-    """The definition that `path` begins with, in `origin.x`, which is no member of a module."""
+    """The definition that `path` begins with, in `origin.x`, which is not a member of a module."""
     found = resolve(db, file, path.partition(".")[0])
     return found if isinstance(found, DefinitionTarget) else None
 

@@ -131,7 +131,7 @@ _OPTION = re.compile(r"`--([a-z-]+)(?: ([^`]+))?`")
 
 def respelled(advice: str, spell: Callable[[str, str | None], str]) -> str:
     """Advice, which names settings as options of the command line (`--max-evals 1000`), as another face writes them:
-    `spell` is given the name of each, with the value if there is one. Options that are no settings stay."""
+    `spell` is given the name of each, with the value if there is one. Options that are not settings stay."""
 
     def spelled(option: re.Match[str]) -> str:
         name = option[1].replace("-", "_")

@@ -68,7 +68,7 @@ class Read(Struct, frozen=True, eq=False):
         return Cell(arg, None, self.t, self.et)
 
 
-class Kept(Struct, frozen=True, eq=False):
+class PreparedCall(Struct, frozen=True, eq=False):
     """What is known of a call, or of its gradient: how its numbers are asked for, what its arguments are like, and how
     its estimate is made."""
 
@@ -96,7 +96,7 @@ class Kept(Struct, frozen=True, eq=False):
         return self.made(number[0], error[0], tangent, off, method="quadrature", **told)
 
 
-class AtOnce(Kept, frozen=True, eq=False):
+class AtOnce(PreparedCall, frozen=True, eq=False):
     """What a call takes for numbers in a region."""
 
     settled: SettledCall | SettledAround
@@ -140,7 +140,7 @@ class AtOnce(Kept, frozen=True, eq=False):
         return env
 
 
-class Together(Kept, frozen=True, eq=False):
+class Together(PreparedCall, frozen=True, eq=False):
     """What a call takes for a batch of numbers."""
 
     batches: Batches

@@ -27,7 +27,7 @@ _ITEM = re.compile(
     rf"(?:def|diffeo|from|import|for|print)\b|record[ \t]+{FIRST_NAME.pattern}[ \t]*\("
     rf"|{FIRST_NAME.pattern}[ \t]*=(?!=)"
 )
-"""The start of a line in the first column that is no part of an expression."""
+"""The start of a line in the first column that is not part of an expression."""
 _LET, _IN = re.compile(r"\blet\b"), re.compile(r"(?<![\w.])in\Z")
 _INDENTED = re.compile(r"\n[^\S\n]+[^\s]")
 _PIECE = re.compile(rf"\n((?:#.*\n)*)(?={_ITEM.pattern})")

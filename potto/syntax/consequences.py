@@ -49,8 +49,8 @@ class Told:
         return [*kept, *self.stops, *([said] if stop.place.start <= self.guessed else [])]
 
     def and_of_trees(self, found: list[Diagnostic]) -> list[Diagnostic]:
-        """All of it, where the grammar came to the end. A line that is no result because it was not understood has its
-        message already; so has what is not a name, or no head of a definition."""
+        """All of it, where the grammar came to the end. A line that gives no result because it was not understood has
+        its message already; so has what is not a name or the head of a definition."""
         places = [d.span.start for d in self.all]
         return self.all + [
             d

@@ -226,7 +226,7 @@ class _Lexer:
         return end
 
     def _odd(self, kind: str, word: str, start: int, end: int) -> int:
-        """What is no word of the language; gives where to go on."""
+        """What is not a word of the language; gives where to go on."""
         if kind == "BADNUMBER":
             self._bad_number(word, start, end)
         elif kind == "STRING" and self._is_loaded(word):

@@ -88,7 +88,7 @@ def _body(tokens: list[Token], index: int) -> int | None:
             if depth == 0 and token.kind == "LPAR" and previous.kind in _ENDS_OPERAND:
                 if token.start > previous.end:
                     return index
-                if not run_ended and previous.text != "len":  # which is no bound itself
+                if not run_ended and previous.text != "len":  # which is not a bound itself
                     best = index
             depth += 1
         elif token.kind in ("RPAR", "RSQB"):

@@ -1,4 +1,4 @@
-"""Characters and operators that are no part of the language, and what their author may have meant."""
+"""Characters and operators that are not part of the language, and what their author may have meant."""
 
 from __future__ import annotations
 

@@ -115,7 +115,7 @@ def is_whole_dual(actual: Type, expected: Type) -> bool:
 
 def _columns(actual: Type, expected: Type, expr: nodes.Expr) -> str:
     """What to write where a table stands for one of its columns, or for its rows, or a record for another one; of
-    columns that are no fields, and the reverse, which."""
+    columns that are not fields, and the reverse, which."""
     if not isinstance(actual, TupleOf) or actual.record is None or not isinstance(expr, nodes.Name | nodes.Member):
         return ""
     if isinstance(expected, TupleOf):

@@ -102,7 +102,7 @@ def _chosen(inference: Inference, node: nodes.Apply, form: str, parameters: Sequ
 
 
 def _unnamed(inference: Inference, node: nodes.Apply, form: str, parameters: Sequence[Parameter]) -> list[Type] | None:
-    """The first parameter, or for a gradient all that are no functions."""
+    """The first parameter, or for a gradient all that are not functions."""
     if form == "D":
         first = parameters[:1]
         fine = first and _may_move(inference, node.arguments[0].value, form, first[0])

@@ -185,7 +185,7 @@ def bare(type: Type) -> Type:
 
 
 def rebuild(type: Type, leaf: Callable[[Type], Type]) -> Type:
-    """A type with every part that is no composite replaced by `leaf` of it."""
+    """A type with every part that is not a composite replaced by `leaf` of it."""
     if isinstance(type, Real):  # most parts
         return leaf(type)
     type = resolve(type)

@@ -12,7 +12,7 @@ from scipy.optimize import least_squares, minimize
 from scipy.special import ndtri
 
 import potto
-from potto.bridges.flat import Flat
+from potto.bridges.flat import FlatFunction
 
 m = potto.compile(r"""
 def area(a, c)
@@ -92,14 +92,14 @@ def test_what_is_asked_twice_at_one_place_is_computed_once() -> None:
 @pytest.mark.parametrize(
     ("make", "told"),
     [
-        (lambda: Flat(m.applied), "given={'shader'"),
-        (lambda: Flat(m.listed), "a number or a tuple of numbers"),
-        (lambda: Flat(m.area, given={"b": 1.0}), "has no parameter `b`"),
-        (lambda: Flat(m.area, wrt="d"), "has no parameter `d`"),
-        (lambda: Flat(m.area, wrt="a", given={"a": 1.0}), "`a` is given"),
-        (lambda: Flat(m.area).bound((1.0,), {}), "needs `c`"),
-        (lambda: Flat(m.area).bound((1.0,), {"a": 2.0, "c": 1.0}), "given twice"),
-        (lambda: Flat(m.area).bound((1.0, 2.0, 3.0), {}), "takes 2 arguments"),
+        (lambda: FlatFunction(m.applied), "given={'shader'"),
+        (lambda: FlatFunction(m.listed), "a number or a tuple of numbers"),
+        (lambda: FlatFunction(m.area, given={"b": 1.0}), "has no parameter `b`"),
+        (lambda: FlatFunction(m.area, wrt="d"), "has no parameter `d`"),
+        (lambda: FlatFunction(m.area, wrt="a", given={"a": 1.0}), "`a` is given"),
+        (lambda: FlatFunction(m.area).bound((1.0,), {}), "needs `c`"),
+        (lambda: FlatFunction(m.area).bound((1.0,), {"a": 2.0, "c": 1.0}), "given twice"),
+        (lambda: FlatFunction(m.area).bound((1.0, 2.0, 3.0), {}), "takes 2 arguments"),
         (lambda: potto.to_scipy(m.area, {}), "no parameter is named"),
         (lambda: potto.to_scipy(m.area, {"a": "x"}), "not at numbers"),
         (lambda: potto.to_scipy(m.area, {"a": 1.0}, given={"c": 1.0}).fun([1, 2]), "2 numbers are given"),

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import potto
-from potto.bridges.flat import Flat
+from potto.bridges.flat import FlatFunction
 
 jax = pytest.importorskip("jax", reason="JAX is not installed: `make test-bridges` runs these tests")
 jnp = jax.numpy
@@ -93,8 +93,8 @@ def test_the_checks_of_jax_itself(name: str, arguments: Any) -> None:
 
 def test_a_batch_is_one_call(monkeypatch: pytest.MonkeyPatch) -> None:
     calls = []
-    slopes = Flat.slopes
-    monkeypatch.setattr(Flat, "slopes", lambda self, *args: calls.append(1) or slopes(self, *args))
+    slopes = FlatFunction.slopes
+    monkeypatch.setattr(FlatFunction, "slopes", lambda self, *args: calls.append(1) or slopes(self, *args))
     area, cs = potto.to_jax(m.area), jnp.linspace(0.1, 0.9, 50)
     found = jax.jit(jax.vmap(jax.grad(area, 1), (None, 0)))(2.0, cs)
     assert found == pytest.approx(np.array(4 * cs * jnp.exp(cs**2)), rel=1e-10)

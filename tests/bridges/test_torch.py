@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import potto
-from potto.bridges.flat import Flat
+from potto.bridges.flat import FlatFunction
 
 torch = pytest.importorskip("torch", reason="PyTorch is not installed: `make test-bridges` runs these tests")
 
@@ -101,8 +101,8 @@ def test_transforms_of_functions(area: Any) -> None:
 
 def test_a_batch_is_one_call(area: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     calls = []
-    slopes = Flat.slopes
-    monkeypatch.setattr(Flat, "slopes", lambda self, *args: calls.append(1) or slopes(self, *args))
+    slopes = FlatFunction.slopes
+    monkeypatch.setattr(FlatFunction, "slopes", lambda self, *args: calls.append(1) or slopes(self, *args))
     cs = torch.linspace(0.1, 0.9, 50, dtype=torch.float64)
     found = torch.func.vmap(torch.func.grad(area, 1), (None, 0))(real(2).detach(), cs)
     assert found.numpy() == pytest.approx(4 * cs.numpy() * np.exp(cs.numpy() ** 2), rel=1e-10)

@@ -38,7 +38,7 @@ _values: list[dict[Term, tuple[float, float]]] = [{} for _ in range(_TRIES)]
 
 
 def not_zero(term: Term) -> bool | None:
-    """Whether a term's value at a point shows that it is not 0 everywhere, as a formula in what is no builtin in it.
+    """Whether a term's value at a point shows that it is not 0 everywhere, as a formula in what is not a builtin in it.
 
     False where it may be 0; None where no point was found at which it has a value.
     """

@@ -1,7 +1,7 @@
 """A normal form that recognizes zero: quotients of polynomials over atoms, with exact coefficients.
 
 Owns `is_zero` and `shorter`, which decide whether a determinant vanishes, whether a discriminant cancels, and whether
-an author's inverse is right. Atoms are variables and what is no polynomial; sin^2 + cos^2 = 1, cosh^2 - sinh^2 = 1,
+an author's inverse is right. Atoms are variables and what is not a polynomial; sin^2 + cos^2 = 1, cosh^2 - sinh^2 = 1,
 sqrt(u)^2 = u and exp(a + b) = exp(a) exp(b) are used. Equal normal forms mean equal values wherever both are defined;
 unequal ones mean nothing.
 
@@ -208,7 +208,7 @@ def _size(term: Term) -> int:
 
 
 def as_term(polynomial: Polynomial, rounded: bool = False) -> Term | None:
-    """A polynomial as a term, what is taken away last; None if a coefficient is no double, unless it may be `rounded`
+    """A polynomial as a term, what is taken away last; None if a coefficient is not a float, unless it may be `rounded`
     to one."""
     last = {monomial: c for monomial, c in polynomial.items() if monomial and c < 0}
     first = {monomial: c for monomial, c in polynomial.items() if monomial not in last}

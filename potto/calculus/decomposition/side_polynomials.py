@@ -4,7 +4,7 @@ Owns `by_sides`, and `settling`, which sides leave nothing to the others. A bran
 s*then + (1 - s)*orelse with a side s of 0 or 1, so that an integrand is a polynomial in sides, of degree 1 in each,
 whose coefficients are smooth. The mixed difference by two sides is 0 where what is integrated has no part that both
 bound: their crossing leaves nothing that is not smooth. Of all `or`, `and`, sums and products that is the one rule;
-quotients and powers are no polynomials, but it holds of them as well. What is smooth is a number drawn at random here,
+quotients and powers are not polynomials, but it holds of them as well. What is smooth is a number drawn at random here,
 as any other side is: a polynomial that is 0 there is 0 everywhere, but by chance (Schwartz 1980, Zippel 1979).
 """
 

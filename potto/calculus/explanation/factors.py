@@ -65,7 +65,7 @@ class Factors(Struct):
 
 
 def factored(term: Term) -> Factors:
-    """The factors of a term; one that is no product is its own."""
+    """The factors of a term; one that is not a product is its own."""
     found = Factors()
     _collect(term, 1, found)
     return found

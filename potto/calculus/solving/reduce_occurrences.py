@@ -114,7 +114,7 @@ def _polynomial_in_something(term: Prim, value: Term, name: str, plain: bool) ->
 
 
 def _replaced(term: Term, old: Term, new: Term) -> Term:
-    """A formula with a part replaced; what is no builtin in it is not gone into."""
+    """A formula with a part replaced; what is not a builtin in it is not gone into."""
 
     def below(node: Term) -> tuple[Term, ...]:
         return node.args if isinstance(node, Prim) and node is not old else ()

@@ -141,7 +141,7 @@ def sections(surface: Term, name: str, plain: bool = False) -> Sections | Unsolv
 def factors(surface: Term) -> tuple[Term, ...]:
     """Terms where a surface changes its sign: of (x - t)/(y - s) both x - t and y - s, of z*t - z*y both z and t - y.
 
-    Along y the first of them is no root, so whoever looks for roots in one variable after the other asks for each.
+    Along y the first of them is not a root, so whoever looks for roots in one variable after the other asks for each.
     """
     found: dict[Term, None] = {}
     waiting = [surface]

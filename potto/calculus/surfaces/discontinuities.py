@@ -176,7 +176,7 @@ class _Search(Struct, frozen=True):
                 yield Finding("step", piece)
         for center in centers(node):
             yield Finding("center", substitute(center, mapping))
-        if node.op != "div":  # a pole is no edge to cut at: the integral diverges there or the pole is outside
+        if node.op != "div":  # a pole is not an edge to cut at: the integral diverges there or the pole is outside
             for edge in entry.edges(*node.args):
                 for piece in self.pieces(edge, mapping):
                     yield Finding("edge", piece)

@@ -1,6 +1,6 @@
 """Values of terms at sample points, to 50 digits.
 
-Owns `vanishes`, which tests on points whether a term is 0 everywhere. What is no builtin and no choice (integrals,
+Owns `vanishes`, which tests on points whether a term is 0 everywhere. What is not a builtin and no choice (integrals,
 calls, ...) counts as an unknown with a value of its own, so that a term which vanishes for all its values is found.
 """
 

@@ -180,7 +180,7 @@ def _file_names(db: Database, site: Site, place: CompletionPlace) -> Iterator[Co
     own = None if site.writing is None else owner(db, site.writing[0])  # a constant cannot be made of itself
     for each in (file, *preludes(db, file)):
         for name, kind in written_kinds(db, each):
-            if fits(place.word, name) and not (each == file and name == own and kind == "constant"):
+            if _has_letters(place.word, name) and not (each == file and name == own and kind == "constant"):
                 data = ("definition", each, name)
                 yield Completion(name, kind, place.span, name, _OWN + name, data=data)
         for item in imports(db, each):
@@ -194,7 +194,7 @@ def _file_names(db: Database, site: Site, place: CompletionPlace) -> Iterator[Co
                     yield Completion(bound, "module", place.span, bound, _IMPORTED + bound, data=data)
 
 
-def fits(word: str, name: str) -> bool:
+def _has_letters(word: str, name: str) -> bool:
     """Whether a name contains the letters of a word in their order: an editor shows no others. In a file of a thousand
     definitions, listing them all takes longer than checking this."""
     letters = iter(name.casefold())

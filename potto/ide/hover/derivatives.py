@@ -84,8 +84,8 @@ Functions = tuple[tuple[str, str], ...]  # parameters that are functions, each w
 
 
 def conditions(db: Database, file: str, name: str, given: Functions = ()) -> tuple[Condition, ...]:
-    """The conditions of a sound definition, those of functions that it is given as well. A text that is no function of
-    the file, or not a sound one, gives none."""
+    """The conditions of a sound definition, and those of functions that it is given. A text that is not a function of
+    the file, or not a sound one, has none."""
     functions: dict[str, Term] = {}
     for parameter, text in given:
         if wrong_with(db, file, text):

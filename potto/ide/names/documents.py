@@ -36,7 +36,7 @@ def module_documentation(db: Database, file: str) -> str:
 
 
 def _prose(found: ParsedChunk, end: int) -> str:
-    """Comments in front of a place; live expressions are no prose."""
+    """Comments in front of a place; live expressions are not prose."""
     lines = [
         comment.text.lstrip("#").strip()
         for comment in found.comments

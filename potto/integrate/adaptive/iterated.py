@@ -73,7 +73,7 @@ class Iteration(Struct):
 
     @property
     def degrees(self) -> tuple[int | None, ...]:
-        """By variable the degree of what is integrated: what crosses a face has speeds, which are no polynomials."""
+        """By variable the degree of what is integrated: what crosses a face has speeds, which are not polynomials."""
         return self.plan.degrees if self.face is None else ()
 
     def whole(self, env: dict[str, Value], batch: int) -> Sums:

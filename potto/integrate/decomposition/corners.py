@@ -222,7 +222,7 @@ def within_walls(
 ) -> list[Row]:
     """The cuts of a range outside of whose walls nothing is integrated, without those outside.
 
-    face: the surface, if any, that is no wall, since it is what is integrated over.
+    face: the surface, if any, that is not a wall, since it is what is integrated over.
     """
     slopes = machine.with_directions(0).evaluate(level.slopes, {n: env[n] for n in level.slopes.params}, None)
     least: Any = -np.inf

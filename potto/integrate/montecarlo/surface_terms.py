@@ -45,7 +45,7 @@ from potto.kernels.cells import Array, Bools, Cell, Mask, Value, pad
 
 # A root that phi's own slope puts further away than this (in labels) is not one that phi passes through smoothly.
 OFF = 1e-6
-JUMPED = 16.0  # from how many times that on what phi is beside a root, measured by its slope, is no power of it
+JUMPED = 16.0  # from how many times that on what phi is beside a root, measured by its slope, is not a power of it
 ROUNDING = 16 * EPS  # of what crosses at one point
 PLACED = 4 * EPS  # of the place of a point, going through its label
 LINES = 1 << 11  # lines searched at once

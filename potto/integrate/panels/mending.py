@@ -24,7 +24,7 @@ UNREACHED = 1e-12
 
 
 def mend(evaluated: Evaluated, seg: Segments, index: Ints, u: Array, du: Array, h: Array, bounds: Array | None) -> None:
-    """Put values, and bounds of their errors, from further in where channels (C, P, n) are no numbers.
+    """Put values, and bounds of their errors, from further in where channels (C, P, n) are not numbers.
 
     u, du: (P, n) as for the map. Of nodes so close to an end that integrals further in give up, of 1/(x + y) along y at
     x = 1e-20, nothing is known but that they count little if values grow slowly; they may be off by all that they are.

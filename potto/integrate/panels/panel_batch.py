@@ -233,7 +233,7 @@ class PanelBatch(Struct, dict=True):
         return numbers, errors, None if sums.common is None else sums.common.reshape(sums.v.shape[0], -1, *x.shape)
 
     def of_rounding(self) -> Bools:
-        """The segments that rounding leaves between two places that are one, beside others of which that is no part."""
+        """The segments that rounding leaves between two places that are one, beside others that it is not part of."""
         seg, size = self.seg, self.seg.b - self.seg.a
         few: Bools = size < NARROW * np.maximum(np.abs(seg.a), np.abs(seg.b))
         return few & (size < ONE_PLACE * np.bincount(seg.owner, size)[seg.owner]) if few.any() else few

@@ -102,7 +102,7 @@ def note_ends(at_ends: Array, p: Pieces, seg: Segments, coefficients: Array, rul
 
 def hidden_steps(at_ends: Array, seg: Segments, jumps: bool) -> Array:
     """What is left out where an integrand that is said to bend at cuts takes a step across several that rounding takes
-    for one, (m, k, S) by the segment above: the step times how fast it moves. jumps: or only what is no plain jump."""
+    for one, (m, k, S) by the segment above: the step times how fast it moves. jumps: only what is not a plain jump."""
     before, after = at_ends[0][:, 1, :-1], at_ends[0][:, 0, 1:]
     size = np.abs(before) + np.abs(after)
     step = np.abs(after - before)

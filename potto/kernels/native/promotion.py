@@ -98,7 +98,7 @@ class Promotion:
 
 
 class ByNumpy:
-    """A block that numpy computes in; it may be as short as a kernel, so that it is no generator."""
+    """A block that numpy computes in; it may be as short as a kernel, so that it is not a generator."""
 
     __slots__ = ("made", "promotion", "start")
 
@@ -114,7 +114,7 @@ class ByNumpy:
 
 
 def settle() -> None:
-    """Wait until nothing is being compiled (for measurements: whatever else was asked for is no part of them)."""
+    """Wait until nothing is being compiled (for measurements: whatever else was asked for is not part of them)."""
     if _worker.cache_info().currsize:
         _worker(os.getpid()).submit(int).result()
 

@@ -44,7 +44,7 @@ Shortfalls = dict[Shortfall, Any]
 
 def missing(term: Integral, sums: Sums, settings: Settings, env: dict[str, Value]) -> Bools:
     """The members of a batch of integrals for which it pays to look further: values or derivatives are not as accurate
-    as was asked for, and what is off is no speck beside what the others come to. Those that go into one sum are
+    as was asked for, and what is off is not a speck beside what the others come to. Those that go into one sum are
     measured by it."""
     out: Bools = np.zeros(sums.v.shape[-1], dtype=bool)
     whole = together(env, sums.v)

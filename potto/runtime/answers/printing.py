@@ -28,7 +28,7 @@ MOST_ITEMS = 12  # of an array that are shown
 DOUBLE = 18  # significant digits: one more than tell all doubles apart, so that rounding to them loses nothing
 SMALLEST = -5  # the power of ten from which on numbers are written without an exponent
 SMALLEST_ERROR = -4  # the same of errors
-# Of a unit of the last digit: 0.027 is no double, and the one nearest to it is not to cost a unit of the error.
+# Of a unit of the last digit: 0.027 is not a double, and the one nearest to it is not to cost a unit of the error.
 BLUR = Fraction(1, 2**40)
 
 

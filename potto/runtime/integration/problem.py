@@ -243,7 +243,7 @@ class Problem:
         known.append(plan)
         # Each as it was made: evaluation adds to what a plan knows, in forms that are for this process alone.
         if store.is_on():
-            with suppress(TypeError):  # what is no data is not kept
+            with suppress(TypeError):  # what is not data is not kept
                 self.known.packed.append(plan.packed())
                 keep("plans", self.known.key, self.known.packed)
         fits = self.fitting(plan)

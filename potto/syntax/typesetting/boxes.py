@@ -19,7 +19,7 @@ _LETTERS = (
 )
 GREEK = dict(pair.split("=") for pair in _LETTERS.split())
 SIGNS = {"<=": "≤", ">=": "≥", "!=": "≠", "==": "=", "-": "−", "*": "·"}
-_PRIME = "delta_prime"  # what the derivative of a delta is called while it is parsed: `delta'` is no name
+_PRIME = "delta_prime"  # what the derivative of a delta is called while it is parsed: `delta'` is not a name
 _CALLED = {"delta": "δ", _PRIME: "δ′"}
 _TURNED = {">": "<", ">=": "<="}
 

@@ -24,7 +24,7 @@ from potto.integrate.fixed.straight import CLEAR, ROW_BITS, RowNumbers, Straight
 from potto.integrate.pieces import Evaluator, gather
 from potto.kernels.cells import Array, Bools, Cell, Ints, Number, Value
 
-LEAST = 2  # members, below which numbers are no columns for machine code
+LEAST = 2  # members, below which numbers are not columns for machine code
 FEW = 16  # numbers, up to which comparing with each of them takes less time than looking them up
 Turning = tuple[tuple[bool, bool], ...]
 
@@ -189,8 +189,8 @@ def _spread(value: Value, batch: int, moving: bool) -> Value:
 def _rows(values: tuple[Cell, ...], count: int) -> tuple[Array, Array]:
     """The places of bounds and cuts, and how far they may be off, (R, M) each.
 
-    What was divided by a difference that is 0 is at infinity, with nan for what it may be off. That is no root, if the
-    surface is clear of its rounding in the middle of each cell: one that a divisor of the size of its rounding has in a
+    What was divided by a difference that is 0 is at infinity, with nan for what it may be off. That is not a root, if
+    the surface is clear of its rounding in the middle of each cell: one that a divisor of the size of its rounding has in a
     cell leaves no more there than that size times the farther end, on one side of 0 at most twice the middle.
     """
     places, off = np.empty((2, len(values), count))

@@ -103,7 +103,7 @@ class TopologyText(FormulaText):
         at.end()
 
     def placed(self, cells: Sequence[Symbol]) -> list[str]:
-        """Where rows are; nowhere, if they were divided by 0 and that tells that they are no roots (`topologies`)."""
+        """Where rows are; nowhere, if they were divided by 0 and that tells that they are not roots (`topologies`)."""
         at, ends = self.at, [cell.v for cell in cells[:2]]
         above, below = (at.apply("and", *(at.apply(way, end, self.zero) for end in ends)) for way in ("ge", "le"))
         one_sided, places = at.apply("or", above, below), ends

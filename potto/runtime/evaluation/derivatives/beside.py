@@ -20,7 +20,7 @@ NEARER = CLOSER ** np.arange(3.0)  # the steps that are taken, as parts of the f
 # What successive differences may be of the one before where there is a limit, and what is no difference at all.
 SETTLING, SAME = 0.75, 1e-6
 MISSED = 1 / 16  # the least part of what is extrapolated that may be wrong
-LEAP = 1e-9  # the part of a value that is no jump of it
+LEAP = 1e-9  # the part of a value that is not a jump of it
 # How many places a smooth derivative is extrapolated from, each half as far as the one before, and the fewest of them:
 # from twelve that are 1/4 to 1/8192 away what is analytic as far as 1 has 12 digits, with what rounding leaves there.
 FINE, FEWEST = 12, 3
@@ -108,7 +108,7 @@ def _smooth(
     """The limit of derivatives at places that shrink, and how far off it may be, where these are smooth in the step, or
     in its root, as beside a fold: by polynomials through neighbours among them, of which the one counts that changes
     the least when either end is left out. The limit known before stays where nothing better is found, or another
-    limit, which something nearer by has. One that is no number may come of rounding, which grows towards the
+    limit, which something nearer by has. One that is not a number may come of rounding, which grows towards the
     parameters: it gives way to one that hardly changes, unless what is at the parameters is another value."""
     slopes = np.array([np.where(np.isfinite(et), t, np.nan) for _, _, t, et in found])
     known = np.isfinite(limit)

@@ -47,7 +47,7 @@ def _closed(value: Value) -> bool:
 
 
 def _sizes(value: Value) -> list[int] | None:
-    """How many numbers each cell of a state has; None for what is no state of numbers."""
+    """How many numbers each cell of a state has; None for what is not a state of numbers."""
     if isinstance(value, Cell):
         return [1]
     if isinstance(value, tuple):

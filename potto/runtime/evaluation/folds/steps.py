@@ -7,7 +7,7 @@ what is done one by one is a few hundred blocks and not ten thousand steps.
 later blocks make of all of these together, a zonotope, is known column by column (Kühn 1998). Within a block they are
 bounded along axes that turn with the steps (Lohner's method: Q from a QR factorization of what a block makes of the
 axes before). Bounding each component by itself in each step would let an error that only turns grow without end, and
-along axes alone it would grow as the square of the steps where what it turns along is no circle.
+along axes alone it would grow as the square of the steps where what it turns along is not a circle.
 """
 
 from __future__ import annotations

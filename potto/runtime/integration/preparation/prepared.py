@@ -248,7 +248,7 @@ def _counted(term: Integral, reach: Reach, again: bool) -> Integral:
 
 
 def _is_unknown(function: Term) -> bool:
-    """Whether the derivative of something is called that is no function as it stands."""
+    """Whether the derivative of something is called that is not a function as it stands."""
     head = spine(function)[0] if isinstance(function, App) else function
     while isinstance(head, Deriv):
         head = head.function
