@@ -61,7 +61,7 @@ def _from_log(level: Array) -> Array:
     return share
 
 
-# linear: as it is. srgb: numbers are light, the file has what a screen wants. log: what is weak can be seen.
+# linear: as it is. srgb: numbers are light, the file has what a screen wants. log: what is faint can be seen.
 TONES = {
     "linear": Tone(lambda share: share, lambda level: level),
     "srgb": Tone(_to_srgb, _from_srgb),

@@ -1,9 +1,9 @@
 """A function of Potto as one of rows of numbers: what all bridges have in common.
 
 Owns `FlatFunction` and `Leaf`. The parameters that a bridge passes on are rows of numbers, (*batch, numbers), and so
-are the answers: values (*batch, answers), slopes (*batch, answers, moving), curvatures (*batch, answers, moving, moving). How
-rows are put together from arguments is the library's own work, so that it differentiates that itself; one batch, of
-whatever shape, is one call of Potto.
+are the answers: values (*batch, answers), slopes (*batch, answers, moving), curvatures (*batch, answers, moving,
+moving). How rows are put together from arguments is the library's own work, so that it differentiates that itself; one
+batch, of whatever shape, is one call of Potto.
 """
 
 from __future__ import annotations

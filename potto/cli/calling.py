@@ -32,7 +32,7 @@ def assignment(text: str) -> tuple[str, str]:
     """`name=EXPR` as a pair; for argparse."""
     name, equals, expression = text.partition("=")
     if not equals or not name.strip().isidentifier() or not expression.strip() or expression.startswith("="):
-        raise argparse.ArgumentTypeError(f"{text!r} does not say which parameter is what; write `name=value`")
+        raise argparse.ArgumentTypeError(f"{text!r} does not say which parameter it is for; write `name=value`")
     return name.strip(), from_file(expression.strip())
 
 

@@ -36,7 +36,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
                         help="what a parameter may be; one side may be left out")  # fmt: skip
     parser.add_argument("--target", metavar="EXPR", help="what the function should be (with --data, the name of a "
                         "column); then the mean squared distance is made least")  # fmt: skip
-    parser.add_argument("--data", metavar="FILE.csv", help="parameters as columns of a table with a line of names")
+    parser.add_argument("--data", metavar="FILE.csv", help="parameters as columns of a table with a header line")
     parser.add_argument("--steps", type=int, default=200, help="the most steps (default 200)")
     parser.add_argument("--optimizer", dest="way", choices=("lbfgs", "gauss-newton", "adam"), default="lbfgs",
                         help="how it goes down: lbfgs; gauss-newton for a target; adam for what is noisy")  # fmt: skip

@@ -74,7 +74,7 @@ def _add_colours(parser: argparse.ArgumentParser) -> None:
                          "and derivatives beside each other (.png, .jpg, .pdf, .svg)")  # fmt: skip
     colours.add_argument("--surfaces", action="store_true", help="draw in the figure of --scale where surfaces are")
     colours.add_argument("--tone", metavar="VALUE[,DERIVATIVE]", type=_tones, default=("linear", "linear"),
-                         help="linear; srgb: the numbers are light; log: what is weak can be seen; `linear,log`: one "
+                         help="linear; srgb: the numbers are light; log: what is faint can be seen; `linear,log`: one "
                          "for the value, one for derivatives (default linear)")  # fmt: skip
 
 
@@ -356,7 +356,7 @@ def _tell(
         )
         console.complain(f"interrupted: {done}")
     for reason in found.reasons:
-        console.complain(f"warning: not as accurate everywhere as was asked: {reason}")
+        console.complain(f"warning: not everywhere as accurate as asked: {reason}")
 
 
 def _cost(found: Drawn, grid: Grid, options: argparse.Namespace) -> str:
@@ -368,7 +368,7 @@ def _cost(found: Drawn, grid: Grid, options: argparse.Namespace) -> str:
 def _crossed(found: Drawn, grid: Grid) -> str:
     """How many pixels a surface crosses, as far as one looked."""
     if found.crossed is None:
-        return "pixels crossed by a surface: not known"
+        return "pixels crossed by a surface: unknown"
     some, all = found.crossed
     what = "pixels" if all == grid.width * grid.height * len(found.frames) else "integrals"
     return f"{what} crossed by a surface: {some:,} of {all:,} ({100 * some / all:.1f} %)"

@@ -21,8 +21,8 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", nargs="?", metavar="FILE", help="a program whose names are in scope")
     parser.add_argument("-c", dest="entries", action="append", default=[], metavar="EXPR",
                         help="answer this entry or command and leave; may be given several times")  # fmt: skip
-    parser.add_argument("--keep-going", action="store_true", help="in a script, go on after an error")
-    parser.add_argument("--vi", action="store_true", help="keys of vi (also `:set keys vi`)")
+    parser.add_argument("--keep-going", action="store_true", help="in a script, carry on after an error")
+    parser.add_argument("--vi", action="store_true", help="vi keys (also `:set keys vi`)")
     parser.add_argument("--theme", choices=("dark", "light", "none"), default="dark", help="colours of the prompt")
     parser.add_argument("--ascii", action="store_true", help="no symbols beyond ASCII")
     add_options(parser)

@@ -6,7 +6,7 @@ import argparse
 
 from potto.cli.console import Console
 
-SUMMARY = "enter recorded sessions (`:record FILE`) again and say which answers changed"
+SUMMARY = "replay recorded sessions (`:record FILE`) and say which answers changed"
 EXAMPLE = "  potto replay session.log"
 
 

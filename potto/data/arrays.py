@@ -231,7 +231,7 @@ def _real(dtype: object) -> str:
     kind = dtype.lstrip("<>|=")[:1] if isinstance(dtype, str) else "V"
     if kind == "O":
         raise _pickled()
-    found = _ODD.get(kind, "values of a kind that is not known")
+    found = _ODD.get(kind, "values of an unknown kind")
     raise malformed(f"the array holds {found}, not real numbers", found=str(dtype), hint=_SAVE)
 
 

@@ -71,7 +71,9 @@ def read(path: Path) -> bytes | DataMistake:
     except FileNotFoundError:
         return _absent(path)
     except PermissionError:
-        return _unreadable(f"the file {quoted(path.name)} may not be read", "ask for permission to read it")
+        return _unreadable(
+            f"the file {quoted(path.name)} cannot be read: permission denied", "ask for permission to read it"
+        )
     except (OSError, ValueError) as error:
         said = error.strerror if isinstance(error, OSError) else str(error)
         return _unreadable(f"the file {quoted(path.name)} can't be read: {said}", "")

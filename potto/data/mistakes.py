@@ -12,7 +12,7 @@ UNREADABLE, UNKNOWN_KIND, BAD_ROW, NO_PACKAGE, MALFORMED = "P0801", "P0802", "P0
 
 TITLES = {
     UNREADABLE: "a file of data that can't be read",
-    UNKNOWN_KIND: "a file of data of a kind that is not known",
+    UNKNOWN_KIND: "a data file of an unknown kind",
     BAD_ROW: "a row of a file of data that is not right",
     NO_PACKAGE: "a file of data that only a further package can read",
     MALFORMED: "a file of data that is malformed",

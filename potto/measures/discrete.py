@@ -54,7 +54,7 @@ binomial = register(
         mean=lambda n, p: mul(n, p),
         variance=lambda n, p: mul(n, p, sub(ONE, p)),
         valid=lambda n, p: (
-            (prim("le", ONE, n), "there must be a trial"),
+            (prim("le", ONE, n), "there must be at least one trial"),
             (prim("eq", n, prim("floor", n)), "the number of trials must be whole"),
             (prim("and", prim("lt", ZERO, p), prim("lt", p, ONE)), "the chance must be more than 0 and less than 1"),
         ),

@@ -87,7 +87,7 @@ _CALLED = {
     "π": "pi", "Pi": "pi", "PI": "pi", "∞": "inf", "infinity": "inf", "True": "1", "true": "1", "False": "0",
     "false": "0", "dirac": "delta",
 }  # fmt: skip
-"""What can be written in the place of a name of elsewhere as it stands."""
+"""What can be written as it stands in place of a name from another language."""
 
 MARKS = ("potto.toml", ".git", "pyproject.toml")  # of the folder of a project
 

@@ -218,7 +218,7 @@ def _of_arrays(stop: Stop) -> Diagnostic | None:
     if at.kind == "IF" and (loop is not None or _goes_through(stop)):
         what = "an array has no filter: its size is known before its elements"
         what = what if loop is None else f"`{loop.text}` has no filter"
-        help = "let what is not meant count nothing: `sum x in xs (if x > 0 then x else 0)`"
+        help = "to leave some out, let them add 0: `sum x in xs (if x > 0 then x else 0)`"
         return kinds.UNEXPECTED(at.span, what, help=help)
     if at.kind == "COLON" and loop is not None:
         what, help = ("step", _FOLD_HELP) if loop.kind == "FOLD" else ("body", _SUM_HELP)

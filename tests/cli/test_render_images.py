@@ -107,7 +107,7 @@ def test_for_machines(potto: Potto) -> None:
     (["pixel", "c=1", "--range", "1,0"], "not LO,HI", 2),
     (["pixel", "c=1", "--tone", "linear,loud"], "none of linear, srgb, log", 2),
     (["pixel", "c=1", "--axes", "px"], "two axes", 1),
-    (["pixel", "c"], "which parameter is what", 2),
+    (["pixel", "c"], "which parameter it is for", 2),
     (["pixel", "c=1", "-o", "no/such/folder.png"], "there is no folder `no/such`", 2),
     (["3"], "is not a function", 1),
 ])  # fmt: skip

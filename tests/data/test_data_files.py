@@ -50,7 +50,7 @@ def test_folders_and_devices(tmp_path: Path) -> None:
 def test_what_may_not_be_read(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("1")
     (tmp_path / "a.csv").chmod(0)
-    assert unread(tmp_path / "a.csv")[:2] == ("P0801", "the file `a.csv` may not be read")
+    assert unread(tmp_path / "a.csv")[:2] == ("P0801", "the file `a.csv` cannot be read: permission denied")
 
 
 def test_names_that_are_nearly_right() -> None:

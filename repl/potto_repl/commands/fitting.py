@@ -103,7 +103,7 @@ def _assignments(text: str) -> dict[str, str]:
     spaced = re.sub(r"(?<=[\w)\]])\s+(?=[^\W\d]\w*\s*=[^=])", ", ", text)
     pairs = [item.partition("=") for item in split_items(spaced)]
     if not all(name.strip().isidentifier() and value.strip() for name, _, value in pairs):
-        raise Refusal(f"`{text.strip()}` does not say which parameter is what", "write `t=0.5, c=1`")
+        raise Refusal(f"`{text.strip()}` does not say which parameter it is for", "write `t=0.5, c=1`")
     return {name.strip(): value.strip() for name, _, value in pairs}
 
 

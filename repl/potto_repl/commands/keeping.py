@@ -27,7 +27,7 @@ def undo(session: Conversation, text: str) -> list[Part]:
     `:undo 3` takes back the last three.
     """
     if text and not (text.isdecimal() and int(text)):
-        raise Refusal(f"`:undo` takes back as many changes as it is told, not `{text}`", "write `:undo` or `:undo 3`")
+        raise Refusal(f"`:undo` takes the number of changes to undo, not `{text}`", "write `:undo` or `:undo 3`")
     labels = [label for _ in range(min(int(text or 1), len(session.undoing))) if (label := session.undo()) is not None]
     said = [answer(f"took back {label}", undone=label) for label in labels]
     return said or [answer("there is nothing to undo", undone=None)]

@@ -190,8 +190,8 @@ def _rows(values: tuple[Cell, ...], count: int) -> tuple[Array, Array]:
     """The places of bounds and cuts, and how far they may be off, (R, M) each.
 
     What was divided by a difference that is 0 is at infinity, with nan for what it may be off. That is not a root, if
-    the surface is clear of its rounding in the middle of each cell: one that a divisor of the size of its rounding has in a
-    cell leaves no more there than that size times the farther end, on one side of 0 at most twice the middle.
+    the surface is clear of its rounding in the middle of each cell: one that a divisor of the size of its rounding has
+    in a cell leaves no more there than that size times the farther end, on one side of 0 at most twice the middle.
     """
     places, off = np.empty((2, len(values), count))
     for row, cell in enumerate(values):

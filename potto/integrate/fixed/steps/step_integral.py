@@ -49,9 +49,9 @@ class StepIntegral(Struct, frozen=True, eq=False):
 
     frame: both bounds, then the cuts, each once. body: the integrand, with `names` for the step functions. dark:
     whether it is 0 where all of these are. degree: of the body in the variable, None where it is not a polynomial.
-    steps: per step function the rows of its cuts. heights: of one step function after the other what adds up to its height
-    below all cuts, a number by itself and one for each cut, then by how much it changes at each. resting: which have
-    nothing but numbers for heights. proofs: what was proved last (`step_orders`), by the accuracy.
+    steps: per step function the rows of its cuts. heights: of one step function after the other what adds up to its
+    height below all cuts, a number by itself and one for each cut, then by how much it changes at each. resting: which
+    have nothing but numbers for heights. proofs: what was proved last (`step_orders`), by the accuracy.
     """
 
     variable: str
