@@ -30,6 +30,7 @@ from lsp_whole import drawn, sizes_measured, table
 from lsp_workspace import resigned, workspace, written
 
 Row = tuple[str, str, float, str, float, float]  # gate, what, value, unit, goal, stretch
+RESTED = 3.0  # seconds of quiet after which a server has kept what it knows of a workspace
 
 
 def replace(line: int, start: int, end: int, text: str) -> dict[str, Any]:
@@ -57,6 +58,7 @@ def measure(folder: Path, texts: dict[str, str], rounds: int) -> Iterator[Row]:
     yield "", "- processor time of the server", client.processor(), "s", 2.5, 1.2
     yield "", "- processor time of its helpers, each on a processor of its own", client.ended(), "s", 2.5, 1.2
     yield "G10", "memory then", client.memory(), "MB", 120, 90
+    client.quiet(RESTED)
     with client.apart():
         yield from typing(client, large, rounds)
         yield from by_a_person(client, large, max(rounds // 10, 2))
@@ -71,6 +73,8 @@ def measure(folder: Path, texts: dict[str, str], rounds: int) -> Iterator[Row]:
     diagnosed, used = client.diagnosed("large") - client.started, client.processor()
     yield "G8", "start to diagnostics of the opened file, known from earlier", diagnosed * 1e3, "ms", 350, 250
     yield "", "- processor time", used * 1e3, "ms", 350, 250
+    yield "G9", "whole workspace known from earlier", checked(client), "s", 2.5, 1.2
+    yield "", "- processor time of the server for that", client.processor(), "s", 2.5, 1.2
     client.process.kill()
 
 

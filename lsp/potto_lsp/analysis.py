@@ -281,7 +281,7 @@ class Analysis:
         return self._kept is not None and self._kept.is_left
 
     def take_kept(self) -> None:
-        """Take over what an earlier session has found out about one file."""
+        """Take over a part of it."""
         file = self._kept.take() if self._kept is not None else None
         if file is not None:
             self.taken.add(file)
@@ -292,22 +292,23 @@ class Analysis:
     def keep_all(self, kept: Callable[[], None]) -> Iterator[Callable[[], None]]:
         """The steps by which what is known of the workspace is kept for later sessions. `kept` is called if nothing has
         come between them."""
-        from potto.checking.kept import Keeper
+        from potto.checking.kept import Keeper, Part, parts_of
 
         keeper = Keeper(self.db, self.files.roots)
 
-        def add(file: str) -> None:
+        def add(part: Part) -> None:
             try:
-                keeper.add(file)
+                keeper.add(part)
             except Exception as error:
-                self.failed(file, "keeping", error)
+                self.failed(part[0], "keeping", error)
 
         def finish() -> None:
             if keeper.finish():
                 kept()
 
         for file in self.programs():
-            yield lambda file=file: add(file)  # type: ignore[misc]
+            for part in parts_of(self.db, file):
+                yield lambda part=part: add(part)  # type: ignore[misc]
         yield finish
 
     def keep(self, key: str) -> None:

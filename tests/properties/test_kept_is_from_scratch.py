@@ -16,7 +16,7 @@ from edited_programs import WORKSPACE, edited
 from how_many import examples
 
 from potto.checking.check import diagnostics
-from potto.checking.kept import Keeper, Kept
+from potto.checking.kept import Keeper, Kept, parts_of
 from potto.checking.library import Library
 from potto.elaborate import core
 from potto.modules import names
@@ -67,7 +67,8 @@ def edit_and_ask(library: Library, root: Path, texts: dict[str, str], rng: rando
 def keep(library: Library, root: Path) -> None:
     keeper = Keeper(library.db, [str(root)])
     for name in WORKSPACE:
-        keeper.add(str(root / name))
+        for part in parts_of(library.db, str(root / name)):
+            keeper.add(part)
     assert keeper.finish()
 
 
@@ -143,7 +144,8 @@ def test_what_is_interrupted_by_an_edit_is_not_kept(tmp_path: Path) -> None:
     library = session(tmp_path, WORKSPACE, random.Random(0))
     keeper = Keeper(library.db, [str(tmp_path)])
     for name in WORKSPACE:
-        keeper.add(str(tmp_path / name))
+        for part in parts_of(library.db, str(tmp_path / name)):
+            keeper.add(part)
         library.put(str(tmp_path / "main.po"), f"# {name}\n")
     assert not keeper.finish() and not taken(Library([tmp_path]), tmp_path)
 
