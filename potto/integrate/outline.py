@@ -20,7 +20,7 @@ from potto.calculus.differentiation.level_sets import LevelSet
 from potto.calculus.solving.enclosable import slope_of
 from potto.calculus.surfaces.branch_assignment import box_of as extents
 from potto.calculus.surfaces.case_split import by_extremes
-from potto.calculus.surfaces.discontinuities import Decide, Finding, Resolve
+from potto.calculus.surfaces.finding import Finding, Resolve
 from potto.core.packing import packed
 from potto.core.terms import Integral, Lam, Term, function_of, tuple_
 from potto.integrate.decomposition.vanishing import held, vanishing_of
@@ -88,7 +88,7 @@ class Outlines:
 
 
 def outlined(
-    term: Integral, found: Sequence[Finding], hides: bool, resolve: Resolve, decide: Decide, over: LevelSet | None,
+    term: Integral, found: Sequence[Finding], hides: bool, resolve: Resolve, over: LevelSet | None,
     findings: Callable[[Term], Iterable[Finding]], mixed: Iterable[Term] = (),
 ) -> Outline:  # fmt: skip
     """The outline of an integral whose integrand has these surfaces; `findings` gives those of a bound. mixed: surfaces
@@ -97,7 +97,7 @@ def outlined(
     def holds(paths: Paths) -> Mapping[Term, int]:
         return held(vanishing_of(term.body, paths, resolve=resolve))
 
-    levels, groups = group_levels(sweep(term, found, resolve, decide, True, over, holds).levels)
+    levels, groups = group_levels(sweep(term, found, resolve, findings, True, over, holds).levels)
     numbers = {j.path: (g.number, j.orientation) for g in groups for j in g.cut.jumps}
     return Outline(
         term,

@@ -20,7 +20,8 @@ from potto.calculus.decomposition.surface_cuts import along
 from potto.calculus.differentiation.level_sets import LevelSet, placed_along
 from potto.calculus.inlining.expand import expanded
 from potto.calculus.inlining.unrolled import unrolled
-from potto.calculus.surfaces.discontinuities import Decide, Finding, Resolve, findings
+from potto.calculus.surfaces.discontinuities import findings
+from potto.calculus.surfaces.finding import Decide, Finding, Resolve
 from potto.calculus.surfaces.hoist import hidden, hoisted, split_at_bounds
 from potto.calculus.surfaces.lifted import Lifted, lifted
 from potto.calculus.surfaces.nested_brackets import has_nested, nested
@@ -302,7 +303,7 @@ def _outlined(
         found = asked.findings(term.body)
         hides = hidden(term, found, asked.resolve)
     reaches = not asked.unknown
-    outline = outlined(term, found, hides, asked.resolve, asked.remember, over, asked.findings, several)
+    outline = outlined(term, found, hides, asked.resolve, over, asked.findings, several)
     if term is whole and asked.times == times and reaches and over is None and not mixed:
         outlines.put(found, outline)
     return outline, reaches, premises, confused

@@ -13,7 +13,7 @@ import potto
 from potto.calculus.algebra import degree
 from potto.calculus.inlining import expand
 from potto.calculus.surfaces import discontinuities
-from potto.calculus.surfaces.discontinuities import ends_of_domain
+from potto.calculus.surfaces.domains import ends_of_domain
 from potto.core import binders, packing
 from potto.core.terms import Term, rebuild
 from potto.integrate import plan

@@ -14,7 +14,7 @@ from collections.abc import Mapping, Sequence
 
 from potto.calculus.algebra.point_values import sample_value
 from potto.calculus.inlining.currying import arguments_of, sizes_of, uncurry
-from potto.calculus.surfaces.discontinuities import Resolve
+from potto.calculus.surfaces.finding import Resolve
 from potto.calculus.surfaces.trace import layout, spine
 from potto.core.terms import (
     ONE,

@@ -34,8 +34,7 @@ from potto.calculus.decomposition.surface_cuts import (
     points_of,
 )
 from potto.calculus.differentiation.level_sets import LevelSet
-from potto.calculus.surfaces.case_split import by_extremes
-from potto.calculus.surfaces.discontinuities import Decide, Finding, Kind, Resolve, findings
+from potto.calculus.surfaces.finding import Finding, Kind, Resolve
 from potto.core.terms import ZERO, Integral, Term, substitute
 
 MOST_EDGES = 24  # per variable, of densities further in, each of which has up to eight hints
@@ -148,10 +147,11 @@ class Sweep(Struct, frozen=True):
 
 
 def sweep(
-    term: Integral, found: Iterable[Finding], resolve: Resolve, decide: Decide, outermost: bool = False,
-    over: LevelSet | None = None, holds: Holds | None = None,
+    term: Integral, found: Iterable[Finding], resolve: Resolve, findings: Callable[[Term], Iterable[Finding]],
+    outermost: bool = False, over: LevelSet | None = None, holds: Holds | None = None,
 ) -> Sweep:  # fmt: skip
-    """Place every surface of an integral's body at the variable that it cuts. outermost: nobody asks for the rest.
+    """Place every surface of an integral's body at the variable that it cuts. `findings` finds those of its bounds.
+    outermost: nobody asks for the rest.
 
     over: the level set over which the innermost variable is not integrated but summed. holds: the surfaces of which
     nothing is integrated on one side.
@@ -169,7 +169,7 @@ def sweep(
         last = outermost and variable == term.variables[0]
         levels.append(_level(pool, variable, bounds, hints, over if not levels else None, last, polynomial))
         for bound in bounds:
-            for finding in findings(bound, resolve, decide):
+            for finding in findings(bound):
                 if finding.kind == "jump":
                     pool.put(finding.surface, None, False)
                 elif finding.kind != "center":
@@ -230,18 +230,3 @@ def _kind(placed: Placed) -> Kind:
     if placed.steps:  # of [x*y > 0] the integral over y jumps at x = 0
         return "jump"
     return "edge" if placed.turning else "kink"
-
-
-def outer_findings(term: Integral, resolve: Resolve, decide: Decide) -> tuple[Finding, ...]:
-    """What the variables around an integral see of it: jumps that none of its variables take part in, and kinks."""
-    term = by_extremes(term)
-    found = findings(term.body, resolve, decide)
-    inner = set(term.variables)
-    bounds = (f for pair in term.bounds for bound in pair for f in findings(bound, resolve, decide))
-    jumps = tuple(
-        replace(f, path=())
-        for f in (*found, *bounds)
-        if f.kind == "step" or (f.kind == "jump" and not f.surface.free & inner)
-    )
-    swept = sweep(term, (f for f in found if f.kind != "jump" or f.surface.free & inner), resolve, decide)
-    return (*jumps, *swept.outer)

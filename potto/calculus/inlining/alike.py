@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from msgspec import Struct
 
 from potto.calculus.inlining.deciding import deciding
-from potto.calculus.surfaces.discontinuities import Resolve
+from potto.calculus.surfaces.finding import Resolve
 from potto.core.terms import (
     Array,
     Branch,

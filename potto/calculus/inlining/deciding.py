@@ -9,7 +9,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from potto.calculus.inlining.currying import fitted, sizes_of, uncurry
-from potto.calculus.surfaces.discontinuities import Resolve, underlying
+from potto.calculus.surfaces.discontinuities import underlying
+from potto.calculus.surfaces.finding import Resolve
 from potto.calculus.surfaces.trace import spine
 from potto.core.terms import App, Array, Fold, Global, If, Lam, Length, Prim, Sum, Term, Var, children, postorder
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from potto.calculus.inlining.expand import Calls
-from potto.calculus.surfaces.discontinuities import Decide, Resolve
+from potto.calculus.surfaces.finding import Decide, Resolve
 from potto.calculus.surfaces.trace import spine
 from potto.core.binders import apart
 from potto.core.terms import (

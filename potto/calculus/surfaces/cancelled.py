@@ -10,7 +10,7 @@ from collections import Counter
 from collections.abc import Iterable
 
 from potto.calculus.algebra.rational_form import as_term, is_zero, normal
-from potto.calculus.surfaces.discontinuities import ends_of_domain
+from potto.calculus.surfaces.domains import ends_of_domain
 from potto.core.terms import Branch, Term, Var, branch, children, const, div, postorder, sub, substitute
 
 _ELSEWHERE = const(0.4375)  # a value that no program would choose

@@ -8,17 +8,18 @@ only as deep as its values go.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from functools import lru_cache
-from typing import Literal
 
 from msgspec import Struct
 from msgspec.structs import replace
 
-from potto.calculus.algebra.ranges import nonnegative
-from potto.calculus.decomposition.critical import Critical
+from potto.calculus.decomposition.sweep import sweep
 from potto.calculus.inlining.currying import arguments_of, groups_of, sizes_of, uncurry
 from potto.calculus.inlining.expand import expanded, holds_call
+from potto.calculus.surfaces.case_split import by_extremes
+from potto.calculus.surfaces.domains import ends_of_domain
+from potto.calculus.surfaces.finding import Decide, Finding, Resolve
 from potto.calculus.surfaces.nested_brackets import BINDERS, pieces
 from potto.calculus.surfaces.trace import CallSite, Side, Subkernel, layout, spine
 from potto.core.terms import (
@@ -45,29 +46,6 @@ from potto.primitives import PRIMITIVES
 DEEPEST = 2000
 ROUNDS = 12  # of a recursion that are carried out in a surface
 
-Kind = Literal["jump", "kink", "edge", "center", "critical", "step"]
-# Where a part of the program gets its functions from: a Lam for the head of a call, or None if it is not known here.
-Resolve = Callable[[Term], "Lam | Deriv | None"]
-# The value of a plain term (a condition: 1 or 0), or None where it is not decided.
-Decide = Callable[[Term], "float | None"]
-
-
-class Finding(Struct, frozen=True):
-    """One surface `surface = 0`, over the variables of the term that was searched.
-
-    kind: a jump (a branch), a kink (abs, max), an edge, where the term stops being smooth or defined (sqrt at 0), or a
-        center, around which a smooth term may be concentrated (x - m in exp(-(x - m)^2), u in 1/(1 + exp(u))), or a
-        critical place of an integral: of `surface` and others, somewhere inside; or a step, where what parameters alone
-        decide (`if a < b`, floor) changes.
-    path: for a jump, the sites of the trace that lead to the branch.
-    """
-
-    kind: Kind
-    surface: Term
-    path: tuple[int, ...] = ()
-    strict: bool = False
-    critical: Critical | None = None
-
 
 class TooDeep(Exception):
     """A recursion was followed past `DEEPEST` calls."""
@@ -91,28 +69,7 @@ def underlying(head: Term, resolve: Resolve) -> tuple[Lam | None, int]:
 
 def findings(term: Term, resolve: Resolve, decide: Decide = undecided) -> tuple[Finding, ...]:
     """All surfaces of a term, jumps with the trace that forces them. Raises TooDeep."""
-    searched = _Search(resolve, decide).term(term, {}, (), 0)
-    found = tuple(_carried_out(f, resolve) for f in searched)
-    ends = {end: None for f in found if f.kind == "jump" for end in ends_of_domain(f.surface)}
-    return (*found, *(Finding("kink", end) for end in ends))
-
-
-@lru_cache(maxsize=4096)  # where another shader stands between the surfaces, they are what they were
-def ends_of_domain(surface: Term) -> tuple[Term, ...]:
-    """Where a condition stops being defined, if it does, each place once: on what lies beyond it has no side.
-
-    An edge that is a period's is a pole, on both sides of which there is a value.
-    """
-    return tuple(dict.fromkeys(_ends_of_domain(surface)))
-
-
-def _ends_of_domain(surface: Term) -> Iterator[Term]:
-    for node in outside(surface, BINDERS):
-        if isinstance(node, Prim) and node.free and node.op != "div":
-            entry = PRIMITIVES[node.op]
-            for end in () if entry.period else entry.edges(*node.args):
-                if not nonnegative(end):
-                    yield from (piece for piece in pieces(end) if piece.free)
+    return _Search(resolve, decide).findings(term)
 
 
 @lru_cache(maxsize=4096)
@@ -151,6 +108,11 @@ class _Search(Struct, frozen=True):
     resolve: Resolve
     decide: Decide
 
+    def findings(self, term: Term) -> tuple[Finding, ...]:
+        found = tuple(_carried_out(f, self.resolve) for f in self.term(term, {}, (), 0))
+        ends = {end: None for f in found if f.kind == "jump" for end in ends_of_domain(f.surface)}
+        return (*found, *(Finding("kink", end) for end in ends))
+
     def term(self, term: Term, mapping: dict[str, Term], path: tuple[int, ...], depth: int) -> Iterator[Finding]:
         if depth > DEEPEST:
             raise TooDeep
@@ -187,11 +149,17 @@ class _Search(Struct, frozen=True):
         return (piece for piece in pieces(surface) if piece.free)
 
     def nested(self, node: Integral, mapping: dict[str, Term]) -> Iterator[Finding]:
-        from potto.calculus.decomposition.sweep import outer_findings
-
+        """What the variables around an integral see of it: jumps that none of its variables take part in, and kinks."""
         inner = substitute(node, mapping)
         assert isinstance(inner, Integral)
-        yield from outer_findings(inner, self.resolve, self.decide)
+        inner = by_extremes(inner)
+        found, own = self.findings(inner.body), set(inner.variables)
+        bounds = (f for pair in inner.bounds for bound in pair for f in self.findings(bound))
+        for f in (*found, *bounds):
+            if f.kind == "step" or (f.kind == "jump" and not f.surface.free & own):
+                yield replace(f, path=())
+        swept = (f for f in found if f.kind != "jump" or f.surface.free & own)
+        yield from sweep(inner, swept, self.resolve, self.findings).outer
 
     def part(self, site: Subkernel, mapping: dict[str, Term], path: tuple[int, ...], depth: int) -> Iterator[Finding]:
         owner = site.owner

@@ -10,7 +10,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from potto.calculus.surfaces.discontinuities import Finding, Resolve, carried_out, findings
+from potto.calculus.surfaces.discontinuities import carried_out, findings
+from potto.calculus.surfaces.finding import Finding, Resolve
 from potto.core.terms import (
     Branch,
     Integral,

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from potto.calculus.inlining.currying import arguments_of, sizes_of, uncurry
-from potto.calculus.surfaces.discontinuities import Resolve
+from potto.calculus.surfaces.finding import Resolve
 from potto.calculus.surfaces.trace import layout, spine
 from potto.core.terms import App, Branch, Const, If, Lam, ListOf, Prim, Proj, Term, Tuple, postorder, var
 from potto.kernels.cells import Mask

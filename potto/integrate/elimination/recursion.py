@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -23,7 +23,8 @@ from potto.calculus.decomposition.elimination import Distribution, EliminationSt
 from potto.calculus.decomposition.surface_cuts import MOST_CENTERS, cut_along, points_of
 from potto.calculus.decomposition.sweep import Level, sweep
 from potto.calculus.surfaces.case_split import cased
-from potto.calculus.surfaces.discontinuities import Finding, Kind, Resolve, TooDeep, findings, undecided
+from potto.calculus.surfaces.discontinuities import TooDeep, findings
+from potto.calculus.surfaces.finding import Finding, Kind, Resolve
 from potto.core.simplify import simplify
 from potto.core.terms import (
     ZERO,
@@ -155,7 +156,7 @@ def _planned(
     found += (Finding(kind, surface) for surface, kind in beside)
     hides = any(kind == "jump" for _, kind in beside)  # a table can't be told which side to take
     steps = [f for f in found if f.kind == "jump" and step.variable not in f.surface.free]
-    swept = sweep(term, (f for f in found if f not in steps), known, undecided)
+    swept = sweep(term, (f for f in found if f not in steps), known, partial(findings, resolve=known))
     for cut in swept.levels[0].cuts:
         if cut.decides and cut.product:
             steps += (Finding("jump", factor.form) for factor in cut.product.outer)

@@ -17,7 +17,8 @@ from potto.calculus.algebra.degree import plane
 from potto.calculus.differentiation.level_sets import placed_along
 from potto.calculus.inlining.expand import expanded
 from potto.calculus.solving.enclosable import enclosable
-from potto.calculus.surfaces.discontinuities import Resolve, ends_of_domain
+from potto.calculus.surfaces.domains import ends_of_domain
+from potto.calculus.surfaces.finding import Resolve
 from potto.calculus.surfaces.nested_brackets import BINDERS
 from potto.core.terms import (
     Branch,
