@@ -15,7 +15,8 @@ from potto_repl.respond import respond
 from potto_repl.session import Conversation
 
 from potto.applications import figures
-from potto.applications.pictures import Image, Plot
+from potto.applications.framed import Image
+from potto.applications.pictures import Plot
 from potto.cli import render, rendering
 from potto.cli.console import Console
 from potto.cli.opening import opened

@@ -10,7 +10,7 @@ import json
 import os
 from collections.abc import Callable, Mapping
 
-from potto.applications.minimizing import Iterate
+from potto.applications.minimization import Iterate
 from potto.kernels.errors import wrong_call
 
 

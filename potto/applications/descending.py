@@ -6,14 +6,11 @@ Both ask a `Minimization` for values and tell it steps; it keeps the best place 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from potto.applications.minimization import Minimization
 from potto.kernels.cells import Array
-
-if TYPE_CHECKING:
-    from potto.applications.minimizing import Minimization
 
 RATE = 0.2  # of Adam, in first steps: where a parameter goes at most in one step; it falls to 0 as a cosine
 MEMORY_OF_SLOPES, MEMORY_OF_SQUARES = 0.9, 0.99

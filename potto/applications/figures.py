@@ -12,10 +12,10 @@ from collections.abc import Sequence
 from importlib.util import find_spec
 from typing import Any
 
+from potto.applications.framed import OUTLINE, Image, images_svg
 from potto.applications.picture_files import complaint as plain_complaint
 from potto.applications.picture_files import ending_of
-from potto.applications.pictures import Curve, Image, Plot
-from potto.applications.svg import OUTLINE, images_svg
+from potto.applications.pictures import Curve, Plot
 from potto.runtime.answers.printing import format_digits
 
 _LIBRARY = ("matplotlib", "matplotlib", "plots")

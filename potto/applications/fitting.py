@@ -15,7 +15,8 @@ import numpy as np
 from msgspec.structs import replace
 
 from potto.applications.checkpoints import keeping, kept
-from potto.applications.minimizing import METHODS, MOST_STEPS, Fit, Iterate, Seen, minimized
+from potto.applications.minimization import Iterate, Seen
+from potto.applications.minimizing import METHODS, MOST_STEPS, Fit, minimized
 from potto.kernels.cells import Array
 from potto.kernels.errors import wrong_call
 from potto.python.functions import Function

@@ -1,6 +1,6 @@
-"""Pictures as data: curves and images, and their files.
+"""Plots as data: curves over axes, and their files.
 
-Owns `Plot`, `Image` and `png`. How a terminal shows them is in `drawing`.
+Owns `Plot`. How a terminal shows it is in `drawing`; images are in `framed`.
 """
 
 from __future__ import annotations
@@ -12,10 +12,9 @@ from collections.abc import Sequence
 
 from msgspec import Struct
 
-from potto.applications.png import encode
+from potto.applications.png import Color, png
 from potto.runtime.answers.printing import format_digits
 
-Color = tuple[int, int, int]
 COLORS: tuple[Color, ...] = ((31, 119, 180), (214, 39, 40), (44, 160, 44), (148, 103, 189), (255, 127, 14))
 WHITE: Color = (255, 255, 255)
 FAR = 100.0  # times the least: a course that is drawn by its logarithm
@@ -184,57 +183,6 @@ class Plot(Struct, frozen=True):
         return png(pixels)
 
 
-class Image(Struct, frozen=True):
-    """Pixels row by row from the top, the least and the largest value; whether zero is white between two colours.
-
-    label: what is drawn. names, box: the axes and what is seen of them. map, tone: how numbers became colours, as
-    `colours.Paint` says; no map where the pixels are colours themselves. ends: the numbers at both ends of the map.
-    outlines: straight lines over it, where surfaces are.
-    """
-
-    pixels: tuple[tuple[Color, ...], ...]
-    low: float
-    high: float
-    signed: bool = False
-    label: str = ""
-    names: tuple[str, str] = ("x", "y")
-    box: tuple[float, float, float, float] = (0.0, 1.0, 0.0, 1.0)
-    map: str = ""
-    tone: str = "linear"
-    ends: tuple[float, float] = (0.0, 1.0)
-    caption: str = ""
-    outlines: tuple[tuple[tuple[float, float], tuple[float, float]], ...] = ()
-
-    @property
-    def size(self) -> tuple[int, int]:
-        return (len(self.pixels[0]) if self.pixels else 0), len(self.pixels)
-
-    def png(self) -> bytes:
-        return png(self.pixels)
-
-    def svg(self) -> str:
-        """The image with its axes, its scale and its caption, as an SVG."""
-        from potto.applications.svg import images_svg
-
-        return images_svg([self])
-
-
-def image_of(components: Sequence[Sequence[float]], columns: int, *, signed: bool = False) -> Image:
-    """An image of one component in greys, or of three as red, green and blue; scaled from the least to the largest.
-
-    signed: of a derivative; zero is white, what is above it red, what is below it blue.
-    """
-    from potto.applications.colours import coloured
-
-    colours, low, high = coloured(components, signed)
-    rows = (colours[i : i + columns] for i in range(0, len(colours), columns))
-    plain = len(components) < 3
-    most = max(-low, high) or 1.0
-    colouring = ("red-blue" if signed else "gray") if plain else ""
-    ends = (-most, most) if signed else (low, high)
-    return Image(tuple(map(tuple, rows)), low, high, signed and plain, map=colouring, ends=ends)
-
-
 def ticks(low: float, high: float) -> list[float]:
     """Round numbers from low to high, `MOST_TICKS` at the most: steps of 1, 2 or 5 times a power of ten."""
     rough = (high - low) / MOST_TICKS
@@ -287,9 +235,3 @@ def line(points: Sequence[tuple[float, float]]) -> set[tuple[int, int]]:
         steps = max(abs(round(x1) - round(x0)), abs(round(y1) - round(y0)), 1)
         found |= {(round(x0 + (x1 - x0) * i / steps), round(y0 + (y1 - y0) * i / steps)) for i in range(steps + 1)}
     return found
-
-
-def png(pixels: Sequence[Sequence[Color]]) -> bytes:
-    """Pixels as a PNG file."""
-
-    return encode(bytes(channel for row in pixels for pixel in row for channel in pixel), len(pixels[0]), len(pixels))

@@ -1,12 +1,15 @@
 """PNG files, as far as we need them: eight bits a channel, red, green and blue, and alpha if it is given.
 
-Owns `encode`. A library would bring dozens of formats for the sake of these few lines.
+Owns `encode` and `png`. A library would bring dozens of formats for the sake of these few lines.
 """
 
 from __future__ import annotations
 
 import struct
 import zlib
+from collections.abc import Sequence
+
+Color = tuple[int, int, int]
 
 
 def encode(rgb: bytes, width: int, height: int, quick: bool = False) -> bytes:
@@ -23,6 +26,11 @@ def encode(rgb: bytes, width: int, height: int, quick: bool = False) -> bytes:
         + _chunk(b"IDAT", zlib.compress(raw, 1 if quick else 9))
         + _chunk(b"IEND", b"")
     )
+
+
+def png(pixels: Sequence[Sequence[Color]]) -> bytes:
+    """Pixels as a PNG file."""
+    return encode(bytes(channel for row in pixels for pixel in row for channel in pixel), len(pixels[0]), len(pixels))
 
 
 def _chunk(kind: bytes, data: bytes) -> bytes:

@@ -15,7 +15,8 @@ from potto.cli.console import Console
 from potto.cli.numbers import accounts, add_options, settings_of, show_stats
 
 if TYPE_CHECKING:
-    from potto.applications.minimizing import Fit, Iterate
+    from potto.applications.minimization import Iterate
+    from potto.applications.minimizing import Fit
     from potto.evaluating.world import World
     from potto.runtime.answers.estimate import Estimate
 

@@ -17,8 +17,8 @@ from potto.cli.numbers import totals
 
 if TYPE_CHECKING:
     from potto.applications.colours import Paint
+    from potto.applications.framed import Image
     from potto.applications.images import Grid, Sampled
-    from potto.applications.pictures import Image
     from potto.evaluating.world import World
     from potto.projects.settings import Settings
     from potto.python.functions import Function
@@ -359,8 +359,8 @@ def images(
 
 def _image(layer: Layer, picture: Picture, grid: Grid, caption: str) -> Image:
     from potto.applications.colours import DECADES
+    from potto.applications.framed import Image
     from potto.applications.picture_files import pixels
-    from potto.applications.pictures import Image
 
     first, second = picture.axes
     name = picture.function.written

@@ -10,7 +10,6 @@ from collections.abc import Callable, Sequence
 from potto.core.terms import (
     ONE,
     ZERO,
-    App,
     Array,
     Const,
     Index,
@@ -52,7 +51,6 @@ from potto.modules.data import DataFile, data_file
 from potto.syntax import nodes
 from potto.types.loading import type_of
 from potto.types.types import ANY_SIZE, AnySize, ArrayOf, TupleOf, Type, holds_functions, resolve
-from potto.types.vectors import place_in
 
 
 @rule(nodes.Index)
@@ -65,15 +63,7 @@ def _index(elaboration: Elaboration, node: nodes.Index, scope: LocalNames) -> Va
 
 @rule(nodes.Field)
 def _field(elaboration: Elaboration, node: nodes.Field, scope: LocalNames) -> Value:
-    return field(elaboration, elaboration.term(node.value, scope), node.name)
-
-
-def field(elaboration: Elaboration, whole: Term, name: str) -> Term:
-    """A part of a tuple or a record."""
-    place = place_in(elaboration.shapes.of(whole), name)
-    if place is None:
-        return hole(f"there is no part `{name}`")
-    return part_of(elaboration, whole, place)
+    return elaboration.field(elaboration.term(node.value, scope), node.name)
 
 
 def shaped(elaboration: Elaboration, shape: TupleOf, parts: Sequence[Term]) -> Term:
@@ -93,7 +83,7 @@ def standing(elaboration: Elaboration, whole: Term, type: Type) -> Term:
     match resolve(type):
         case TupleOf(items):
             parts = enumerate(items)
-            return tuple_([standing(elaboration, part_of(elaboration, whole, n), item) for n, item in parts])
+            return tuple_([standing(elaboration, elaboration.part_of(whole, n), item) for n, item in parts])
         case ArrayOf(_, item):
             return _each(elaboration, whole, lambda element: standing(elaboration, element, item))
         case _:
@@ -104,7 +94,7 @@ def zeros(elaboration: Elaboration, whole: Term, type: Type) -> Term:
     """The tangent of a value that stands still: a value like it, of zeros."""
     match resolve(type):
         case TupleOf(items) as shape:
-            parts = [zeros(elaboration, part_of(elaboration, whole, n), item) for n, item in enumerate(items)]
+            parts = [zeros(elaboration, elaboration.part_of(whole, n), item) for n, item in enumerate(items)]
             return shaped(elaboration, shape, parts)
         case ArrayOf(_, item):
             return _each(elaboration, whole, lambda element: zeros(elaboration, element, item))
@@ -121,13 +111,6 @@ def _each(elaboration: Elaboration, whole: Term, made: Callable[[Term], Term]) -
     return array(place, length(whole), made(index(whole, var(place))))
 
 
-def part_of(elaboration: Elaboration, whole: Term, place: int) -> Term:
-    """An item of a tuple, or of a record by the place of its field."""
-    if isinstance(whole, App) and elaboration.shapes.makes_record(whole.function):
-        return whole.args[place]
-    return proj(whole, place)
-
-
 @rule(nodes.Text)
 def _text(elaboration: Elaboration, node: nodes.Text, scope: LocalNames) -> Value:
     return hole("the name of a file has no value by itself")
@@ -140,7 +123,7 @@ def _with(elaboration: Elaboration, node: nodes.With, scope: LocalNames) -> Valu
     shape = elaboration.shapes.of(whole)
     if not isinstance(shape, TupleOf) or shape.record is None or not given.keys() <= set(shape.record.fields):
         return hole("this is not a record with such fields")
-    parts = [given.get(name) or field(elaboration, whole, name) for name in shape.record.fields]
+    parts = [given.get(name) or elaboration.field(whole, name) for name in shape.record.fields]
     return shaped(elaboration, shape, parts)
 
 

@@ -37,7 +37,7 @@ from potto.core.terms import (
     var,
 )
 from potto.core.terms import integral as integral_term
-from potto.elaborate.arrays import combined, field, part_of, shaped
+from potto.elaborate.arrays import combined, shaped
 from potto.elaborate.context import Elaboration, rule
 from potto.elaborate.shapes import dims_of as size_of_tuple
 from potto.elaborate.values import LocalNames, Value
@@ -96,7 +96,7 @@ def _by_parts(elaboration: Elaboration, body: Term, names: frozenset[str], over:
         kind = elaboration.shapes.of(part)
         if isinstance(kind, TupleOf):
             for at in range(len(kind.items)):
-                gather(part_of(elaboration, part, at))
+                gather(elaboration.part_of(part, at))
         elif not isinstance(kind, ArrayOf):
             numbers.append(part)
 
@@ -107,7 +107,7 @@ def _by_parts(elaboration: Elaboration, body: Term, names: frozenset[str], over:
     def built(part: Term) -> Term:
         kind = elaboration.shapes.of(part)
         if isinstance(kind, TupleOf):
-            return shaped(elaboration, kind, [built(part_of(elaboration, part, at)) for at in range(len(kind.items))])
+            return shaped(elaboration, kind, [built(elaboration.part_of(part, at)) for at in range(len(kind.items))])
         if isinstance(kind, ArrayOf) or whole is None:
             return _by_parts(elaboration, part, names, over)
         return proj(whole, next(places)) if len(numbers) > 1 else whole
@@ -198,7 +198,7 @@ def _components(elaboration: Elaboration, factor: Term, term: Term) -> Term:
     shape = elaboration.shapes.of(term)
     if not isinstance(shape, TupleOf) or shape.record is None:
         return combined(elaboration, "*", factor, term)
-    fields = [field(elaboration, term, name) for name in shape.record.fields]
+    fields = [elaboration.field(term, name) for name in shape.record.fields]
     return shaped(elaboration, shape, [scaled(elaboration, factor, part) for part in fields])
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any, TypeVar, cast
 
-from potto.core.terms import INF, PI, Lam, Term, Tuple, app, fresh, global_, hole, lam, proj, var
+from potto.core.terms import INF, PI, App, Lam, Term, Tuple, app, fresh, global_, hole, lam, proj, var
 from potto.elaborate import builtins
 from potto.elaborate.shapes import Shapes
 from potto.elaborate.values import BuiltinValue, LocalFunction, LocalNames, Value, sizes
@@ -20,6 +20,7 @@ from potto.query import Database
 from potto.source import Span
 from potto.syntax import nodes
 from potto.types.types import Real, Type
+from potto.types.vectors import place_in
 
 MAX_DEPTH = 300  # calls of local functions within each other: deeper ones never end
 MAX_CALLS = 100_000
@@ -105,12 +106,21 @@ class Elaboration:
             return global_(target.file, target.name)
         if not hidden and owner(self.db, self.file, path) is None:
             return hole(f"`{path}.{name}` is not defined")
-        from potto.elaborate.arrays import field
-
         found = self.as_term(self.name(head, scope))
         for part in (*inner, name):
-            found = field(self, found, part)
+            found = self.field(found, part)
         return found
+
+    def field(self, whole: Term, name: str) -> Term:
+        """A part of a tuple or a record."""
+        place = place_in(self.shapes.of(whole), name)
+        return hole(f"there is no part `{name}`") if place is None else self.part_of(whole, place)
+
+    def part_of(self, whole: Term, place: int) -> Term:
+        """An item of a tuple, or of a record by the place of its field."""
+        if isinstance(whole, App) and self.shapes.makes_record(whole.function):
+            return whole.args[place]
+        return proj(whole, place)
 
     # Binders
 

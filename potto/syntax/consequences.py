@@ -8,8 +8,9 @@ from __future__ import annotations
 
 from potto.diagnostics import Diagnostic
 from potto.syntax import kinds
-from potto.syntax.messages import Stop, describe
+from potto.syntax.messages import describe
 from potto.syntax.repair import RepairStep
+from potto.syntax.stops import Stop
 
 OF_LINES = (kinds.LAST_LINE.code, kinds.NOT_A_NAME.code, kinds.DEFINITION_HEAD.code)
 """What is said of a whole line, or head, because something in it was not understood."""

@@ -8,15 +8,12 @@ from __future__ import annotations
 
 import re
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 from potto.diagnostics import Diagnostic, suggest
 from potto.source import Span
 from potto.syntax import kinds
+from potto.syntax.stops import Stop
 from potto.syntax.tokens import Token
-
-if TYPE_CHECKING:
-    from potto.syntax.messages import Stop
 
 _TYPE = re.compile(r"[A-Z([]")
 _STATEMENTS = {

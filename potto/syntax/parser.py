@@ -22,10 +22,10 @@ from potto.syntax.foreign_records import declared_elsewhere, in_braces
 from potto.syntax.groups import Context
 from potto.syntax.habits import foreign_statement, habit
 from potto.syntax.lexer import MAX_LENGTH, Lexed, lex
-from potto.syntax.messages import Stop
 from potto.syntax.nesting import MAX_NESTING
 from potto.syntax.nodes import BrokenItem, Definition, ErrorExpr, Expr, Item
 from potto.syntax.repair import RepairStep, find_repair
+from potto.syntax.stops import Stop
 from potto.syntax.tokens import FIRST_NAME, RESERVED, Comment, Token
 from potto.syntax.walk import deeper_than, extent
 

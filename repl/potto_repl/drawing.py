@@ -13,7 +13,9 @@ from typing import Literal
 
 from msgspec.structs import replace
 
-from potto.applications.pictures import Color, Curve, Image, Plot, line
+from potto.applications.framed import Image
+from potto.applications.pictures import Curve, Plot, line
+from potto.applications.png import Color
 from potto.runtime.answers.printing import format_digits
 
 Protocol = Literal["kitty", "iterm", "sixel", "blocks"]

@@ -11,7 +11,7 @@ from ipykernel.kernelapp import IPKernelApp
 from ipykernel.kernelbase import Kernel
 
 from potto import __version__
-from potto.applications.pictures import Image
+from potto.applications.framed import Image
 from potto_repl.cells import placed, result
 from potto_repl.complete import candidates
 from potto_repl.editing import indentation, is_over

@@ -7,7 +7,8 @@ from __future__ import annotations
 
 from msgspec import Struct
 
-from potto.applications.pictures import Image, Plot
+from potto.applications.framed import Image
+from potto.applications.pictures import Plot
 from potto.reports.render import COLORS, PLAIN, Palette
 from potto_repl.drawing import Protocol, braille, half_blocks, inline, room_for_curves, shrunk
 from potto_repl.reply import Part

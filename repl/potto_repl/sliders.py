@@ -11,7 +11,8 @@ from typing import Any
 
 from msgspec.structs import replace
 
-from potto.applications.pictures import Curve, Plot, image_of
+from potto.applications.framed import image_of
+from potto.applications.pictures import Curve, Plot
 from potto.diagnostics import PottoError
 from potto.extras import install_command
 from potto.kernels.errors import wrong_call

@@ -12,7 +12,8 @@ import pytest
 
 import potto
 from potto.__main__ import main
-from potto.applications.minimizing import Seen, minimized
+from potto.applications.minimization import Seen
+from potto.applications.minimizing import minimized
 
 SOURCE = r"""
 def tail(y, mean, width)

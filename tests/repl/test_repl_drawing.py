@@ -12,7 +12,8 @@ import pytest
 from potto_repl.drawing import braille, half_blocks, inline, protocol, sixel
 from potto_repl.paint import Screen, painted
 
-from potto.applications.pictures import Curve, Image, Plot, image_of
+from potto.applications.framed import Image, image_of
+from potto.applications.pictures import Curve, Plot
 
 CHECKERS = Image((((0, 0, 0), (255, 255, 255)), ((255, 0, 0), (0, 0, 255))), 0.0, 1.0)
 

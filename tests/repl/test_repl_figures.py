@@ -8,7 +8,8 @@ import xml.etree.ElementTree as tree
 import pytest
 
 from potto.applications import figures
-from potto.applications.pictures import Curve, Image, Plot, course, ticks
+from potto.applications.framed import Image
+from potto.applications.pictures import Curve, Plot, course, ticks
 from potto.extras import install_command
 
 HALF = "def g(t) integral [0, 1] [x < t]*t^2 d(x)"

@@ -7,17 +7,17 @@ extremum is looked at too, so that two roots between two points of the grid are 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 from mpmath import mp
 from msgspec import Struct
 
-from potto.core.terms import Delta, Integral
+from potto.core.terms import Delta, Integral, Term
 
-if TYPE_CHECKING:
-    from potto.core.reference.walk import Environment, Oracle, Value
+Value = Any  # an mpmath number, a tuple or list of values, a truth value, or a function of values
+Environment = Mapping[str, Value]
 
 _MOST_SPLITS = 6  # halvings of a piece on which quadrature does not settle
 _MOST_TRIES = 4  # at finding a root faster than by halving
@@ -33,6 +33,19 @@ class Trace(Struct):
 
     sides: list[object] = []
     values: list[Any] = []
+
+
+class Oracle(Protocol):
+    """Who evaluates integrands and bounds, and writes the trace. `forced`: the delta that counts as 1."""
+
+    digits: int
+    samples: int
+    trace: Trace | None
+    deciding: int
+    deltas: int
+    forced: int | None
+
+    def run(self, term: Term, env: Environment) -> Value: ...
 
 
 def integrate(oracle: Oracle, term: Integral, env: Environment) -> Value:

@@ -18,7 +18,7 @@ from msgspec import Struct
 
 from potto.core.reference import differences, integrals
 from potto.core.reference.functions import function
-from potto.core.reference.integrals import Trace
+from potto.core.reference.integrals import Environment, Trace, Value
 from potto.core.terms import (
     App,
     Array,
@@ -46,9 +46,7 @@ from potto.core.terms import (
 )
 from potto.primitives import PRIMITIVES
 
-Value = Any  # an mpmath number, a tuple or list of values, a truth value, or a function of values
 Lookup = Callable[[str, str], Term]
-Environment = Mapping[str, Value]
 
 GUARD = 15  # digits beyond those asked for
 _NAMED = {"pi": lambda: +mp.pi, "inf": lambda: mp.inf}
@@ -72,7 +70,7 @@ def evaluate(
     with mp.workdps(digits + GUARD), _deep_recursion():
         values = {name: as_value(value) for name, value in (env or {}).items()}
         held = {place: as_value(value) for place, value in (data or {}).items()}
-        return Oracle(lookup, digits, samples, held).run(term, values)
+        return Walk(lookup, digits, samples, held).run(term, values)
 
 
 @contextlib.contextmanager
@@ -95,7 +93,7 @@ def as_value(value: Any) -> Value:
     return value if callable(value) or isinstance(value, bool) else mp.mpf(value)
 
 
-class Oracle:
+class Walk:
     """One evaluation: how definitions are found, how exact it is, and the trace that is being written."""
 
     def __init__(self, lookup: Lookup | None, digits: int, samples: int, data: Mapping[tuple[str, str], Value]) -> None:
@@ -232,7 +230,7 @@ def _kinks(op: str, arity: int) -> tuple[Term, ...]:
 
 
 class _Closure(Struct, frozen=True):
-    oracle: Oracle
+    oracle: Walk
     term: Lam
     env: Environment
 

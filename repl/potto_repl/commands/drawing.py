@@ -7,7 +7,8 @@ import re
 
 from msgspec.structs import replace
 
-from potto.applications.pictures import Curve, Plot, image_of
+from potto.applications.framed import image_of
+from potto.applications.pictures import Curve, Plot
 from potto.runtime.answers.printing import format_digits, format_error, format_range
 from potto_repl.drawing import braille, half_blocks, room_for_curves
 from potto_repl.expressions import split_items

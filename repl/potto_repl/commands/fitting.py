@@ -13,7 +13,8 @@ from msgspec.structs import asdict
 
 from potto.applications.fitting import by_fields
 from potto.applications.fitting import fit as fitted
-from potto.applications.minimizing import MOST_TOLD, Iterate
+from potto.applications.minimization import Iterate
+from potto.applications.minimizing import MOST_TOLD
 from potto.applications.pictures import course
 from potto.projects.settings import settings
 from potto.python.functions import Function

@@ -1,6 +1,7 @@
-"""Images with axes and a colour bar as SVG: what does without a library for figures.
+"""Images as data, and with axes and a colour bar as SVG: what does without a library for figures.
 
-Owns `images_svg`. The pixels are a PNG inside; all else is text and lines, so that it can be read at every size.
+Owns `Image`, `image_of` and `images_svg`. The pixels are a PNG inside; all else is text and lines, so that it can be
+read at every size.
 """
 
 from __future__ import annotations
@@ -8,17 +9,65 @@ from __future__ import annotations
 import base64
 import html
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
+from msgspec import Struct
+
+from potto.applications.png import Color, png
 from potto.runtime.answers.printing import format_digits
-
-if TYPE_CHECKING:
-    from potto.applications.pictures import Image
 
 LEFT, TOP, BOTTOM, BAR, LABELS = 64, 30, 64, 16, 76
 SIDE = 320  # of the longer side of an image
 OUTLINE = "#2ca02c"  # of surfaces: neither a gray nor of a diverging map
 SHADES = 64  # of a colour bar
+
+
+class Image(Struct, frozen=True):
+    """Pixels row by row from the top, the least and the largest value; whether zero is white between two colours.
+
+    label: what is drawn. names, box: the axes and what is seen of them. map, tone: how numbers became colours, as
+    `colours.Paint` says; no map where the pixels are colours themselves. ends: the numbers at both ends of the map.
+    outlines: straight lines over it, where surfaces are.
+    """
+
+    pixels: tuple[tuple[Color, ...], ...]
+    low: float
+    high: float
+    signed: bool = False
+    label: str = ""
+    names: tuple[str, str] = ("x", "y")
+    box: tuple[float, float, float, float] = (0.0, 1.0, 0.0, 1.0)
+    map: str = ""
+    tone: str = "linear"
+    ends: tuple[float, float] = (0.0, 1.0)
+    caption: str = ""
+    outlines: tuple[tuple[tuple[float, float], tuple[float, float]], ...] = ()
+
+    @property
+    def size(self) -> tuple[int, int]:
+        return (len(self.pixels[0]) if self.pixels else 0), len(self.pixels)
+
+    def png(self) -> bytes:
+        return png(self.pixels)
+
+    def svg(self) -> str:
+        """The image with its axes, its scale and its caption, as an SVG."""
+        return images_svg([self])
+
+
+def image_of(components: Sequence[Sequence[float]], columns: int, *, signed: bool = False) -> Image:
+    """An image of one component in greys, or of three as red, green and blue; scaled from the least to the largest.
+
+    signed: of a derivative; zero is white, what is above it red, what is below it blue.
+    """
+    from potto.applications.colours import coloured
+
+    colours, low, high = coloured(components, signed)
+    rows = (colours[i : i + columns] for i in range(0, len(colours), columns))
+    plain = len(components) < 3
+    most = max(-low, high) or 1.0
+    colouring = ("red-blue" if signed else "gray") if plain else ""
+    ends = (-most, most) if signed else (low, high)
+    return Image(tuple(map(tuple, rows)), low, high, signed and plain, map=colouring, ends=ends)
 
 
 def images_svg(images: Sequence[Image]) -> str:
