@@ -9,6 +9,7 @@ from __future__ import annotations
 import threading
 import weakref
 from collections.abc import Iterator
+from functools import singledispatch
 from typing import Any, TypeVar
 
 from msgspec import Struct
@@ -28,14 +29,13 @@ class Base(Struct, frozen=True, eq=False, weakref=True):
 
     def __repr__(self) -> str:
         """The kind and the text, cut short: a shared term may be a small object and an endless text."""
-        from potto.core.printer import format_term
+        return f"<{type(self).__name__} {short_text(self)}>"
 
-        return f"<{type(self).__name__} {format_term(self, 200)}>"  # type: ignore[arg-type]
 
-    def __reduce__(self) -> Any:
-        from potto.core.rebuilding import rebuilt
-
-        return rebuilt, (type(self), tuple(getattr(self, name) for name in own_fields(type(self))))
+@singledispatch
+def short_text(term: Base) -> str:
+    """The beginning of a term's text. The printer, which knows the kinds of terms, says what that is."""
+    return "…"
 
 
 T = TypeVar("T", bound=Base)

@@ -12,6 +12,7 @@ from collections.abc import Mapping
 
 from msgspec import Struct
 
+from potto.core.consing import Base, short_text
 from potto.core.terms import (
     ONE,
     ZERO,
@@ -93,6 +94,11 @@ def format_term(term: Term, limit: int = 20_000) -> str:
         text = _node(node if not names else _renamed(node, names), texts)
         texts[node] = text if len(text.text) <= limit else _Text(LEFT_OUT, _ATOM)
     return texts[term].text
+
+
+@short_text.register(Base)
+def _short(term: Term) -> str:
+    return format_term(term, 200)
 
 
 def plainly_bound(term: Term) -> Term:

@@ -1,13 +1,15 @@
 """Terms made anew from their fields, as they were pickled, packed or sent.
 
-Owns `rebuilt`.
+Owns `rebuilt`. To pickle terms, this must have been imported: `terms` does.
 """
 
 from __future__ import annotations
 
+import copyreg
 from typing import Any
 
 from potto.core import kinds
+from potto.core.consing import Base, own_fields
 
 
 def rebuilt(cls: type, fields: tuple[Any, ...]) -> Any:
@@ -42,3 +44,12 @@ _MADE_BY: dict[type, Any] = {
     kinds.Deriv: kinds.deriv,
     kinds.Hole: kinds.hole,
 }
+
+
+def _reduced(term: Base) -> tuple[Any, ...]:
+    """How to make a term again, as `copyreg` wants it."""
+    return rebuilt, (type(term), tuple(getattr(term, name) for name in own_fields(type(term))))
+
+
+for kind in _MADE_BY:
+    copyreg.pickle(kind, _reduced)

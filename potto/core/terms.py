@@ -1,7 +1,7 @@
 """Core terms: what programs mean, with nothing left of how they were written.
 
 The one name by which the rest of Potto imports them: the closed union and its constructors (`kinds`), arithmetic that
-folds (`folding`), and walking (`walking`).
+folds (`folding`), walking (`walking`), and how terms are pickled (`rebuilding`).
 """
 
 from potto.core.folding import add as add
@@ -61,6 +61,7 @@ from potto.core.kinds import sum_ as sum_
 from potto.core.kinds import tuple_ as tuple_
 from potto.core.kinds import var as var
 from potto.core.kinds import with_integrand as with_integrand
+from potto.core.rebuilding import rebuilt as rebuilt
 from potto.core.walking import Holding as Holding
 from potto.core.walking import bound_apart as bound_apart
 from potto.core.walking import bound_names as bound_names

@@ -8,7 +8,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 
-from potto_repl.start import Loader
+from potto_repl.loading import Loader
 
 PAUSE = 0.2  # seconds without a key before a text is checked
 

@@ -1,6 +1,6 @@
 """Recorded sessions: entered again, and their answers compared with those of before.
 
-Owns the form of a record (`prompted`, `recorded`) and `replayed`. Numbers may differ by what their error bars and their
+Owns `replayed`. Numbers may differ by what their error bars and their
 last digits leave open; what was measured (times, evaluations) is not compared.
 """
 
@@ -12,21 +12,17 @@ from collections.abc import Iterator
 
 from msgspec import Struct
 
-PROMPT, CONTINUED = "po> ", "... "
+from potto_repl.records import Recorded, recorded
+from potto_repl.respond import respond
+from potto_repl.session import Conversation
+from potto_repl.symbols import readable
+
 _NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e-?\d+)?")
 _MEASURED = re.compile(
     r".*\b(?:evaluations|recompiled|compiled), .*|(?:quadrature|mc|qmc|exact)\b.*"
     r"|(?:parse|check|compile|link|plan|evaluate|total)\b.*|\d+ kernels? made.*|.*report: .*"
 )
 _DOUBT = re.compile(r"(?:±|\+/-|error at most) *(\([^)]*\)|[\d.e-]+)")
-
-
-class Recorded(Struct, frozen=True):
-    """An entry, its line, and its answer; no answer if only the entry was kept."""
-
-    line: int
-    text: str
-    answer: str
 
 
 class ChangedAnswer(Struct, frozen=True):
@@ -36,31 +32,8 @@ class ChangedAnswer(Struct, frozen=True):
     now: str
 
 
-def prompted(text: str) -> str:
-    """An entry as a record shows it."""
-    return PROMPT + text.rstrip().replace("\n", f"\n{CONTINUED}")
-
-
-def recorded(text: str) -> Iterator[Recorded]:
-    """The entries of a record."""
-    start, entry, answer = 0, list[str](), list[str]()
-    for number, line in enumerate([*text.splitlines(), PROMPT], 1):
-        if line.startswith(PROMPT):
-            if entry:
-                yield Recorded(start, "\n".join(entry), "\n".join(answer).strip("\n"))
-            start, entry, answer = number, [line.removeprefix(PROMPT)], []
-        elif entry and not answer and line.startswith(CONTINUED):
-            entry.append(line.removeprefix(CONTINUED))
-        else:
-            answer.append(line)
-
-
 def replayed(text: str) -> Iterator[tuple[Recorded, ChangedAnswer | None]]:
     """Enter each entry of a record again in a new session, and give what is different now."""
-    from potto_repl.respond import respond
-    from potto_repl.session import Conversation
-    from potto_repl.symbols import readable
-
     session = Conversation(["."])
     for entry in recorded(text):
         if re.match(r":(record|rec|quit|q|edit|save|watch)\b", entry.text):

@@ -13,6 +13,7 @@ from potto.diagnostics import PottoError
 from potto.reports.render import Located, ProgramError, display_name
 from potto_repl import commands as _commands  # noqa: F401  (fills the table)
 from potto_repl.editing import flush_left
+from potto_repl.records import prompted
 from potto_repl.registry import Result, find
 from potto_repl.reply import Part, Refusal, Reply, diagnostic, note
 from potto_repl.session import Conversation
@@ -46,8 +47,6 @@ def stream(session: Conversation, text: str) -> Iterator[Part]:
 
 def _write_down(session: Conversation, path: str | None, text: str, said: list[Part]) -> tuple[Part, ...]:
     """An entry and its answer at the end of a transcript; what to say where that cannot be written any more."""
-    from potto_repl.replay import prompted
-
     if path is None or path != session.record:
         return ()
     try:

@@ -5,8 +5,9 @@ from __future__ import annotations
 import shutil
 
 from potto_repl.editing import is_over
+from potto_repl.greeting import greeting, say
 from potto_repl.keyboard import kept_interrupts
-from potto_repl.start import Loader, greeting, say
+from potto_repl.loading import Loader
 
 
 class Simple:

@@ -29,10 +29,11 @@ from prompt_toolkit.styles import DynamicStyle
 
 from potto.evaluating.progress import PLAIN, Progress
 from potto_repl.beside import Checker
+from potto_repl.greeting import greeting
 from potto_repl.highlight import PottoCompleter, PottoLexer, style
 from potto_repl.keyboard import kept_interrupts, loud_keys, quiet_keys
 from potto_repl.keys import bindings
-from potto_repl.start import Loader, greeting
+from potto_repl.loading import Loader
 
 NARROW = 40
 WATCH = 0.3  # seconds between two looks at the files

@@ -7,7 +7,7 @@ import time
 
 import pytest
 from potto_repl.complete import candidates
-from potto_repl.start import Loader
+from potto_repl.loading import Loader
 from potto_repl.terminal import Terminal
 from prompt_toolkit.application import create_app_session
 from prompt_toolkit.history import InMemoryHistory

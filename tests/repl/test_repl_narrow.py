@@ -6,9 +6,9 @@ import os
 import re
 
 import pytest
+from potto_repl.greeting import greeting
 from potto_repl.paint import Screen, painted
 from potto_repl.registry import COMMANDS
-from potto_repl.start import greeting
 from potto_repl.terminal import Terminal
 
 from potto.reports.excerpt import width
