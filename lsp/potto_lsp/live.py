@@ -30,7 +30,7 @@ from potto_lsp.evaluation import LIVE, POINTS, EvaluationTask
 
 if TYPE_CHECKING:
     from potto.syntax.live import Live
-    from potto_lsp.session import ClientSession
+    from potto_lsp.connection import Connection
 
 MOST = 200  # live expressions of one file that are evaluated
 TOGETHER = 20  # definitions whose points are asked for together
@@ -164,7 +164,7 @@ def shown(point: ide.CallPoint, value: Value) -> str:
 class LiveValues:
     """The values of the expressions in shown files. For the thread that owns the database."""
 
-    def __init__(self, session: ClientSession) -> None:
+    def __init__(self, session: Connection) -> None:
         self._session = session
         self._values: dict[Key, Value] = {}
         self._waiting: dict[Key, EvaluationTask] = {}

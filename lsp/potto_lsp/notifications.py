@@ -7,18 +7,35 @@ analysis must know follows as an edit.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 from potto_lsp.uris import to_key
 
 if TYPE_CHECKING:
-    from potto_lsp.server import Server
+    from potto_lsp.connection import Reply
+    from potto_lsp.documents import Documents
+    from potto_lsp.session import ClientSession
+    from potto_lsp.work import Worker
 
-Handler = Callable[["Server", Any], None]
 PATTERNS = ("**/*.{po,diffeo}", "**/potto.toml", "**/*.{csv,tsv,npy,npz,json,png,jpg,jpeg}")
 
 
-def _session(server: Server) -> Any:
+class Server(Protocol):
+    """What notifications need of a server. `edit` changes what the analysis sees, on its thread."""
+
+    documents: Documents
+    session: ClientSession | None
+    worker: Worker | None
+
+    def edit(self, change: Callable[[], object]) -> None: ...
+
+    def request(self, method: str, params: Any, reply: Reply | None = None) -> None: ...
+
+
+Handler = Callable[[Server, Any], None]
+
+
+def _session(server: Server) -> ClientSession:
     assert server.session is not None
     return server.session
 

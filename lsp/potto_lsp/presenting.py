@@ -13,7 +13,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from potto_lsp.session import ClientSession
+    from potto_lsp.connection import Connection
 
 SHORT = 2  # lines that are a message
 INFO = 3
@@ -22,7 +22,7 @@ INFO = 3
 class Presenter:
     """Messages and documents for a client."""
 
-    def __init__(self, session: ClientSession) -> None:
+    def __init__(self, session: Connection) -> None:
         self._session = session
         self._folder: str | None = None
 

@@ -13,7 +13,7 @@ from threading import Lock, Timer
 from typing import TYPE_CHECKING, Any, Literal
 
 if TYPE_CHECKING:
-    from potto_lsp.session import ClientSession
+    from potto_lsp.connection import Connection
 
 _tokens = itertools.count(1)
 SOON, PAUSE = 0.2, 0.1  # seconds: before the first word, and between words
@@ -22,7 +22,7 @@ SOON, PAUSE = 0.2, 0.1  # seconds: before the first word, and between words
 class WorkProgress:
     """Progress of something that can be counted."""
 
-    def __init__(self, session: ClientSession, title: str) -> None:
+    def __init__(self, session: Connection, title: str) -> None:
         self._session, self._title = session, title
         self._token = f"potto-progress-{next(_tokens)}"
         self._started = self._told = time.monotonic()
@@ -62,7 +62,7 @@ class WorkProgress:
 class Working:
     """Something that a user waits for. `token` is the client's, if it gave one; `cancel` stops the work."""
 
-    def __init__(self, session: ClientSession, title: str, token: int | str | None, cancel: Callable[[], None]) -> None:
+    def __init__(self, session: Connection, title: str, token: int | str | None, cancel: Callable[[], None]) -> None:
         self._session, self._title = session, title
         self._own = token is None
         self._token = f"potto-progress-{next(_tokens)}" if token is None else token

@@ -19,14 +19,15 @@ from potto_lsp import errors, memory
 from potto_lsp.asking import Ask, about, uri_of
 from potto_lsp.carrier import StreamServer, settle
 from potto_lsp.client import Client
+from potto_lsp.connection import Reply
 from potto_lsp.crashes import Crashes, Version
 from potto_lsp.deferred import Deferred
 from potto_lsp.documents import Document, Documents
 from potto_lsp.errors import RequestError
-from potto_lsp.features import FEATURES, Feature
+from potto_lsp.features import FEATURES, Feature, load_features
 from potto_lsp.greeting import answer
 from potto_lsp.notifications import NOTIFICATIONS, Handler
-from potto_lsp.session import ClientSession, Reply
+from potto_lsp.session import ClientSession
 from potto_lsp.wire import Outbox
 from potto_lsp.work import Job, Worker
 
@@ -103,7 +104,7 @@ class Server(StreamServer):
         greeting = answer(params)
         client = Client(params)
         self.documents.encoding = client.encoding
-        self.session = ClientSession(client, self.notify, self.request, self.later)
+        self.session = ClientSession(client, self.notify, self.request, self.later, load_features)
         self.worker = Worker(self.session.load, self.session.idle, leave, self._rest, self._arrived)
         self.worker.start()
         if client.process is not None:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from potto_lsp import memory
 from potto_lsp.client import Client
-from potto_lsp.features import FEATURES
+from potto_lsp.connection import Connection, Reply
 from potto_lsp.presenting import Presenter
 from potto_lsp.progress import WorkProgress
 from potto_lsp.work import REST
@@ -21,23 +21,15 @@ from potto_lsp.work import REST
 if TYPE_CHECKING:
     from potto.query import Database
     from potto.reports.render import Located
-    from potto_lsp.analysis import Analysis
-    from potto_lsp.evaluation import EvaluationQueue
-    from potto_lsp.features.colours import Colours
+    from potto_lsp.colouring import Colours
     from potto_lsp.live import LiveValues
-    from potto_lsp.publishing import Publisher
 
 TREES = 50  # checked files after which the trees of closed ones are forgotten
 KEPT_ANEW, KEPT_BEFORE = 600.0, 20.0  # seconds until what is known of the workspace is kept again, or tried again
-Reply = Callable[[Any, Any], None]  # the client's answer and its error; one of them is None
 
 
-class ClientSession:
-    """One client and what is known of its programs."""
-
-    analysis: Analysis
-    publisher: Publisher
-    evaluator: EvaluationQueue
+class ClientSession(Connection):
+    """One client and what is known of its programs. `load_features` loads all that answers questions."""
 
     def __init__(
         self,
@@ -45,10 +37,10 @@ class ClientSession:
         notify: Callable[[str, Any], None],
         request: Callable[[str, Any, Reply | None], None],
         later: Callable[[Callable[[], None]], None],
+        load_features: Callable[[], None] = lambda: None,
     ) -> None:
-        self.client, self.notify, self.request = client, notify, request
-        self.later = later  # do something on the thread that owns the database
-        self.cancels: dict[int | str, Callable[[], None]] = {}  # what a user can cancel, by progress token
+        super().__init__(client, notify, request, later)
+        self._features = load_features
         self.presenter = Presenter(self)
         self.tokens: dict[str, Colours] = {}
         self.checked = False
@@ -200,8 +192,7 @@ class ClientSession:
     def _load_features(self) -> None:
         """Load all adapters, so that the first question doesn't wait for its own."""
         with memory.loading():
-            for feature in FEATURES.values():
-                feature.load()
+            self._features()
 
     def _all_checked(self) -> None:
         self.analysis.dismiss_helpers()
@@ -238,11 +229,6 @@ class ClientSession:
         if changed:
             self.diagnostics_changed()
         return changed
-
-    def diagnostics_changed(self) -> None:
-        """Diagnostics have changed for another reason than an edit."""
-        if self.client.pulls and self.client.can("workspace.diagnostics.refreshSupport"):
-            self.request("workspace/diagnostic/refresh", None, None)
 
 
 def settings_of(settings: Any) -> Mapping[str, Any]:

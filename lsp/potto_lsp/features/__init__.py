@@ -1,6 +1,6 @@
 """The table of features: which adapter answers which method, and what the client is told of it.
 
-Owns `FEATURES` and `capabilities`. An adapter is a function from an `Ask` to what is sent. Its module is loaded when it
+Owns `FEATURES`, `capabilities` and `load_features`. An adapter is a function from an `Ask` to what is sent. Its module is loaded when it
 is first needed, so that the greeting waits for none. `pace` says what a question waits for, see `work`: `slow` is for
 those that look through a whole file or the workspace.
 """
@@ -150,3 +150,9 @@ def capabilities(encoding: str) -> dict[str, Any]:
     for feature in _ALL:
         found.update(feature.announces)
     return found
+
+
+def load_features() -> None:
+    """Load all adapters, so that the first question doesn't wait for its own."""
+    for feature in FEATURES.values():
+        feature.load()
