@@ -1,8 +1,8 @@
 """The table of features: which adapter answers which method, and what the client is told of it.
 
-Owns `FEATURES`, `capabilities` and `load_features`. An adapter is a function from an `Ask` to what is sent. Its module is loaded when it
-is first needed, so that the greeting waits for none. `pace` says what a question waits for, see `work`: `slow` is for
-those that look through a whole file or the workspace.
+Owns `FEATURES`, `capabilities` and `load_features`. An adapter is a function from an `Ask` to what is sent. Its module
+is loaded when it is first needed, so that the greeting waits for none. `pace` says what a question waits for, see
+`work`: `slow` is for those that look through a whole file or the workspace.
 """
 
 from __future__ import annotations
