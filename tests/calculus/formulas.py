@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 import random
+import re
 from dataclasses import dataclass
 
 import numpy as np
@@ -78,13 +79,13 @@ class Shown:
 
 
 def _written(type: Type) -> str:
-    """As it is given here: by constants."""
-    text = format_type(type)
-    return "Real" if text in ("a", "b", "c") else text if "->" in text else text.replace("Real*", "Real")
+    """As it is given here: by constants, for what may be of any type numbers."""
+    text = re.sub(r"\b[abc]\b", "Real", format_type(type))
+    return text if "->" in text else text.replace("Real*", "Real")
 
 
 def _tangent_type(type: Type) -> str:
-    return format_type(derivative_type(type)) if isinstance(resolve(type), Function) else _written(type)
+    return _written(derivative_type(type)) if isinstance(resolve(type), Function) else _written(type)
 
 
 def _given(type: Type, rng: random.Random, whole: bool) -> Given:

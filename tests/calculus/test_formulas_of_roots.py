@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import math
+from fractions import Fraction
 from itertools import pairwise
 
 import mpmath
 import pytest
 from formulas import Shown
+
+from potto.calculus.algebra.ranges import range_of
+from potto.core.terms import prim, var
 
 PERIODIC = [
     (
@@ -36,6 +41,16 @@ def test_periodic_roots_are_counted_by_integers_that_one_reads(body: str, read: 
         assert module.eval(f"shown_1({t}, 1)").value == pytest.approx(_slope(body, t), rel=1e-9, abs=1e-9)
 
 
+@pytest.mark.parametrize("op", ["floor", "ceil"])
+def test_whole_numbers_beside_what_is_anything_are_anything(op: str) -> None:
+    """ceil(-inf) was taken for inf, so that no integer seemed to count where a bound of the domain moves."""
+    assert (range_of(prim(op, var("t"))).lo, range_of(prim(op, var("t"))).hi) == (-math.inf, math.inf)
+    shown = Shown("def f(t) integral [-t, 3] [sin(3*x) < t] d(x)\n", "f")
+    by_roots = _slope("integral [-1/2, 3] [sin(3*x) < t] d(x)", 0.5)
+    # [-t, 3] has its lower end at -1/2 there, where sin(-3/2) < 1/2: the bound adds 1
+    assert shown.module().eval("shown_1(0.5, 1)").value == pytest.approx(by_roots + 1, rel=1e-9)
+
+
 def _slope(body: str, t: float) -> float:
     bounds, condition, factor = _taken_apart(body)
     names = {name: getattr(mpmath, name) for name in ("sin", "cos", "tan", "sqrt", "exp")}
@@ -58,9 +73,10 @@ def _slope(body: str, t: float) -> float:
     return float(total)
 
 
-def _taken_apart(body: str) -> tuple[tuple[int, int], str, str]:
+def _taken_apart(body: str) -> tuple[tuple[float, float], str, str]:
     """`integral [0, 1] [left < right]*factor d(x)`"""
     _, first, rest = body.split("[", 2)
     low, high = first.rstrip(" ]").split(", ")
     condition, _, factor = rest.rpartition("]")
-    return (int(low), int(high)), condition, factor.removeprefix("*").removesuffix(" d(x)") or "1"
+    domain = float(Fraction(low)), float(Fraction(high))
+    return domain, condition, factor.removeprefix("*").removesuffix(" d(x)") or "1"

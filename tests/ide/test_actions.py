@@ -248,3 +248,16 @@ def test_give_a_number_its_tangent():
         f = fixture(f"{head}a = {before}\n")
         title = next(title for title in f.actions() if title.startswith("Write `("))
         assert fixed(f"{head}a = {before}\n", title) == f"{head}a = {after}\n"
+
+
+@pytest.mark.parametrize(
+    ("live", "title", "after"),
+    [
+        ("f$0((0.5 + 1)", "Write `)`", "f((0.5 + 1))"),
+        ("f(0.5)$0)", "Take out `)`", "f(0.5)"),
+    ],
+)
+def test_what_stands_in_a_live_expression_is_mended_too(live: str, title: str, after: str) -> None:
+    f = fixture(f"def f(t) t^2\n\n#> {live}\n#= 0.25\n")
+    assert title in f.actions(), list(f.actions())
+    assert f"#> {after}\n#= 0.25\n" in f.act(title)

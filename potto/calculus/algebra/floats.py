@@ -82,7 +82,8 @@ def _guarded(f: Callable[..., float], entry: Primitive) -> Callable[..., float]:
         try:
             return float(f(*args))
         except OverflowError:
-            return math.copysign(math.inf, args[-1]) if entry.parity < 0 else math.inf
+            signed = entry.parity < 0 or math.isinf(args[-1])  # an infinity has no floor in Python, and is its own
+            return math.copysign(math.inf, args[-1]) if signed else math.inf
         except (ValueError, ZeroDivisionError, ArithmeticError):
             return NAN
 

@@ -106,7 +106,8 @@ def _at_surface(
         gains: list[Term] = []
         for root in new:
             flips = flipping(branches, root.variable, root.at, members)
-            gains += _at_root(node, flips, root, rate, loops, each)
+            exactly = wanted is Roots.READ  # where numbers are rounded, that a fall is 0 shows in exact ones alone
+            gains += _at_root(node, flips, root, rate, loops, each, exactly)
         met += new
         if each:
             apart += gains
@@ -149,7 +150,7 @@ def _guards(at: Term) -> list[Term]:
 
 
 def _at_root(
-    node: Integral, flips: Flips, root: SurfaceRoot, rate: Rate, sums: list[Loop], where: Sequence[Term]
+    node: Integral, flips: Flips, root: SurfaceRoot, rate: Rate, sums: list[Loop], where: Sequence[Term], exactly: bool
 ) -> Iterator[Term]:
     """What is gained at a root, for those instances of it for which some conditions hold."""
     speed = rate(root.at)
@@ -157,7 +158,7 @@ def _at_root(
         return
     instances = _instances(node.body, sums, root.at.free)
     fall = substitute(_fall(node.body, flips, sums, instances, box_of(node)), {root.variable: root.at})
-    if vanishes(fall):
+    if vanishes(fall) or (exactly and not isinstance(zero_like(fall), Tuple) and is_zero(unguarded(fall))):
         return
     gain = scaled(fall, speed)
     lo, hi = node.bounds[node.variables.index(root.variable)]

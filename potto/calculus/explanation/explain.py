@@ -24,7 +24,7 @@ from potto.calculus.explanation.continuity import continuous
 from potto.calculus.explanation.decimals import in_decimals
 from potto.calculus.explanation.fields import fields_of
 from potto.calculus.explanation.layout import DerivativeText, IntegralText, SurfaceText
-from potto.calculus.explanation.plain_names import Each, plainly_indexed, plainly_named
+from potto.calculus.explanation.plain_names import Each, apart, plainly_indexed, plainly_named
 from potto.calculus.explanation.readable import ReadableParts, readable
 from potto.calculus.explanation.symbols import NoFormula, Rewrite, Words, over_functions
 from potto.calculus.inlining.expand import Resolve, heads_of
@@ -258,6 +258,7 @@ def _integral(
         reason = "" if plain is None else _why_searched(plain)
         if plain is not None and level_set(plain) is None:
             bounds = [words.text(t, *indices, box=ranges) for t in at_bounds(plain, rate)]
+            bounds = [text for text in bounds if text != "0"]
             swept = at_surfaces(plain, frozenset(inside), rate, Roots.READ)
             swept = [t for t in swept if not (isinstance(t, Integral) and level_set(t))]
             boundary = [words.text(t, *indices, box=ranges) for t in swept]
@@ -338,8 +339,8 @@ def _surfaces(node: Integral, tangents: Mapping[str, Term], words: Words) -> tup
 def _root(root: SurfaceRoot, words: Words) -> str:
     """A root where it exists; of many that recur, with the name of their index."""
     at = where_it_exists(root.at)
-    index = root.index and stem(root.index)
-    if root.index and index and index not in at.free:
+    index = root.index and apart(stem(root.index), (at.free | words.names | {root.variable}) - {root.index})
+    if root.index and index:
         at = substitute(at, {root.index: var(index)})
     text = format_term(readable(simplify(words.fields(at)), frozenset()))
     return f"{text} for integers {index}" if index else text

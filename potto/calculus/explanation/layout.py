@@ -128,6 +128,14 @@ def _lines(found: DerivativeText, show: Show) -> list[str]:
     return lines
 
 
+def _moving(text: str) -> list[str]:
+    """What a bound adds or, if it is negative as a whole, takes away."""
+    away = text.startswith(("-", "−")) and not any(sign in text for sign in (" + ", " - ", " − "))
+    first, *more = broken(f"  {'-' if away else '+'} ", text[away:], WIDTH)
+    lines = [first, *more]
+    return [*lines[:-1], f"{lines[-1]}   # moving bound"]
+
+
 def _of_integral(title: str, item: IntegralText, show: Show) -> list[str]:
     lines = [f"for each {show(item.each)}"] if item.each else []
     parts = [(item.interior, "interior")] if item.interior and (item.interior != "0" or not item.deltas) else []
@@ -137,7 +145,7 @@ def _of_integral(title: str, item: IntegralText, show: Show) -> list[str]:
         formula = broken("" if number else head, show(item.over(text)), WIDTH)
         formula = formula if not number else [f"{' ' * (len(head) - 2)}+ {formula[0]}", *formula[1:]]
         lines += [*formula[:-1], f"{formula[-1]}   # {kind}"]
-    lines += [f"  + {show(text)}   # moving bound" for text in item.bounds]
+    lines += [line for text in item.bounds for line in _moving(show(text))]
     lines += [f"  + {meets(show(where))}" for where in item.continuous]
     if item.surfaces:
         lines += ["", "surfaces:"]

@@ -6,7 +6,8 @@ that could be imported or defined (`fixes_of_names`), conditions (`fixes_of_cond
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 
 from potto.diagnostics import Diagnostic
 from potto.ide.actions.edits import applied, one_file
@@ -14,17 +15,20 @@ from potto.ide.actions.fixes_of_conditions import bracket_fixes, inverse_fixes
 from potto.ide.actions.fixes_of_names import undefined_fixes
 from potto.ide.actions.offers import At, PendingAction, diagnostics_at
 from potto.ide.model import Change, Edit
+from potto.ide.names.live_expressions import live_diagnostics, live_in
 from potto.ide.names.places import ChunkAt, chunk_at, line_end, line_start
 from potto.modules.kinds import IMPORTED_TWICE, UNUSED_IMPORT
 from potto.source import Span
-from potto.syntax import nodes, parse_chunk, walk
+from potto.syntax import nodes, parse_chunk, parse_expression, walk
 from potto.types.kinds import NOT_DEFINED, UNUSED_LOCAL, UNUSED_VARIABLE, VARYING_CONDITION
 
 
 def fixes(place: At) -> Iterator[PendingAction]:
     """What can be done about the diagnostics that the selection touches."""
     for said in diagnostics_at(place.db, place.file, place.span):
-        yield from _suggested(place, said)
+        chunk = chunk_at(place.db, place.file, said.span.start)
+        if chunk is not None:
+            yield from _suggested(place, said, partial(_errors, chunk))
         if said.code == NOT_DEFINED.code:
             yield from undefined_fixes(place, said)
         elif said.code == VARYING_CONDITION.code:
@@ -35,18 +39,19 @@ def fixes(place: At) -> Iterator[PendingAction]:
             yield from _unused_import(place, said)
         elif said.code in (UNUSED_LOCAL.code, UNUSED_VARIABLE.code):
             yield from _unused_local(place, said)
+    for said in live_diagnostics(place.db, place.file):
+        if said.span.start <= place.span.end and place.span.start <= said.span.end:
+            for text, at in _live_texts(place, said):
+                yield from _suggested(place, said, partial(_errors_of_expression, text, at))
 
 
-def _suggested(place: At, said: Diagnostic) -> Iterator[PendingAction]:
+def _suggested(place: At, said: Diagnostic, errors: Callable[[Sequence[Edit]], int]) -> Iterator[PendingAction]:
     """The changes that a diagnostic carries. What can't be read was guessed at, so that a change is kept if more can be
-    read after it; any other must leave as much."""
-    chunk = chunk_at(place.db, place.file, said.span.start)
-    if chunk is None:
-        return
-    before, preferred = _errors(chunk, ()), True
+    read after it; any other must leave as much. errors: how many there are after some edits."""
+    before, preferred = errors(()), True
     for suggestion in said.suggestions:
         edits = [Edit(edit.span, edit.text) for edit in suggestion.edits]
-        after = _errors(chunk, [Edit(edit.span.shift(-chunk.start), edit.text) for edit in edits])
+        after = errors(edits)
         of_reading = before > 0 and said.code.startswith("P01")
         if after < before or (after == before and not of_reading):
             change = one_file(place.file, *edits)
@@ -54,10 +59,27 @@ def _suggested(place: At, said: Diagnostic) -> Iterator[PendingAction]:
             preferred = False
 
 
-def _errors(chunk: ChunkAt, edits: Iterable[Edit]) -> int:
+def _errors(chunk: ChunkAt, edits: Sequence[Edit]) -> int:
     """How many errors a chunk has after some edits, as far as it can't be read."""
-    found = parse_chunk(applied(chunk.text, edits), chunk.diffeo).diagnostics
+    found = parse_chunk(_edited(chunk.text, chunk.start, edits), chunk.diffeo).diagnostics
     return sum(said.severity == "error" for said in found)
+
+
+def _live_texts(place: At, said: Diagnostic) -> Iterator[tuple[str, int]]:
+    """What stands in a comment and is evaluated, with its place, where something is said about that."""
+    for live in live_in(place.db, place.file):
+        for text, span in ((live.text, live.text_span), (live.expected, live.expected_span)):
+            if text is not None and span is not None and span.start <= said.span.start <= span.end:
+                yield text, span.start
+
+
+def _errors_of_expression(text: str, start: int, edits: Sequence[Edit]) -> int:
+    return len(parse_expression(_edited(text, start, edits)).diagnostics)
+
+
+def _edited(text: str, start: int, edits: Sequence[Edit]) -> str:
+    """A part of a file that begins at `start` after edits of the file."""
+    return applied(text, [Edit(edit.span.shift(-start), edit.text) for edit in edits])
 
 
 # What is not used
