@@ -220,7 +220,7 @@ class ClientSession(Connection):
         return not self.watched and bool(self.analysis.files.data_files())
 
     def data_changed(self) -> bool:
-        """Look at the files of data that programs read, once a second; whether any is another one now."""
+        """Look at the files of data that programs read, once a second; whether any has changed."""
         now, files = time.monotonic(), self.analysis.files
         if now - self._looked < REST:
             return False

@@ -25,7 +25,7 @@ ROUNDING = 1e-16  # of the largest value of a course: what lies below says nothi
 class Curve(Struct, frozen=True):
     """Values and their errors over places in order, nan where there is none.
 
-    breaks: numbers of the points after which the curve jumps. height: what is to be seen of it; beyond it go poles.
+    breaks: numbers of the points after which the curve jumps. height: the range that is shown; poles go beyond it.
     slope: whether it is a derivative, which figures show beside the values.
     """
 

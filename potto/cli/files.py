@@ -20,7 +20,7 @@ PAUSE, SETTLED = 0.2, 0.05  # seconds between two looks at files; for how long n
 
 
 def wait(changed: Callable[[], bool]) -> None:
-    """Come back when something has changed, and is written: who saves a file may leave it empty for a moment."""
+    """Return when something has changed and been written: while it is saved, a file may be empty for a moment."""
     while not changed():
         time.sleep(PAUSE)
     time.sleep(SETTLED)

@@ -188,7 +188,7 @@ class Drawn(Struct):
         return f"{each:.1f} evaluations a pixel, largest error {format_error(self.largest)}"
 
     def take(self, found: Sampled, keep_errors: bool, picture: Picture, chosen: Settings) -> None:
-        """One more frame. What colours show is accurate beside the largest of an image, what numbers are by itself."""
+        """One more frame. Colours are accurate relative to the largest value of an image, numbers each to itself."""
         from potto.applications.images import accurate, largest
 
         half = len(found.numbers) // 2

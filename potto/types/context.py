@@ -188,7 +188,7 @@ class Inference:
             self.diagnostics.append(diagnostic)
 
     def later(self, check: Callable[[], None]) -> None:
-        """Do a check when all types are known."""
+        """Postpone a check until all types are known."""
         self._late.append(check)
 
     # Names

@@ -68,7 +68,7 @@ class Cells:
         return found
 
     def _with_braces(self, located: Located) -> Located:
-        """Of a name that means nothing here and something in Python, how to pass it on."""
+        """How to pass on a name that means something in Python alone."""
         found, source = located.diagnostic, self.session.source(located.file) if located.file is not None else None
         name = "" if source is None else source.text[found.span.start : found.span.end]
         if found.code != NOT_DEFINED or name not in self.shell.user_ns:

@@ -114,6 +114,12 @@ def test_lenses():
     assert "boundary" in (ide.derivative_markdown(f.db, f.file, "f") or "")
 
 
+def test_a_record_is_not_evaluated():
+    f = fixture("record Point(x: Real, y: Real)\n#> Point(1, 2).x\n")
+    assert [lens.command for lens in ide.code_lenses(f.db, f.file)] == ["more"]
+    assert [offer.command for offer in ide.offered(f.db, f.file, "Point")] == ["showReferences"]
+
+
 def test_inline_values_are_expressions():
     f = fixture("def f(x) x\ny = f(1)\nprint(f(2), y)\n#> f(0.5)\n")
     found = ide.inline_values(f.db, f.file, Span(0, len(f.text())))

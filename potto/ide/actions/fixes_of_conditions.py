@@ -100,7 +100,7 @@ def judged(
 
 
 def compared(db: Database, chunk: ChunkAt, condition: Expr) -> Branch | None:
-    """The branch that one comparison is in brackets; None for what is none."""
+    """The branch that one comparison is in brackets; None for anything else."""
     if not isinstance(condition, nodes.Compare) or len(condition.rest) != 1:
         return None
     names = [binder.name for _, binder in chunk.index(db).visible(condition.span.start)]

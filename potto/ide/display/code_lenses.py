@@ -12,7 +12,7 @@ from msgspec.structs import replace
 
 from potto.ide.hover.derivatives import derivative_text
 from potto.ide.model import CodeLens, Offer
-from potto.ide.names.documents import kind_of, name_span
+from potto.ide.names.documents import Kind, kind_of, name_span, written_kind
 from potto.ide.names.places import PieceAt, pieces_of
 from potto.ide.names.points import points
 from potto.ide.names.symbols import DefinitionSymbol
@@ -41,13 +41,20 @@ def piece_lenses(db: Database, file: str, text: str, hidden: tuple[str, ...]) ->
         sketch = chunk.sketch(db)
         if name is not None:
             span = chunk.absolute(sketch.name_span)
-            if kind_of(db, file, name) in ("constant", "function"):
+            if _asked_as(db, file, name) in ("constant", "function"):
                 found.append(CodeLens(span, "value", (file, name)))
             found.append(CodeLens(span, "more", (file, name), "more"))
         elif sketch.kind == "statement" and not running:
             running = True
             found.append(CodeLens(chunk.absolute(sketch.span), "run", (file,), "run"))
     return tuple(found)
+
+
+def _asked_as(db: Database, file: str, name: str) -> Kind:
+    """What a definition can be asked for as. A record is not asked as the function that makes it: what goes in comes
+    out."""
+    written = written_kind(db, file, name)
+    return written if written == "record" else kind_of(db, file, name)
 
 
 def resolve_code_lens(db: Database, lens: CodeLens) -> CodeLens:
@@ -68,7 +75,7 @@ def _call(db: Database, file: str, name: str, do: Literal["evaluate", "different
 
 def offered(db: Database, file: str, name: str) -> Iterator[Offer]:
     """What can be done with a definition."""
-    kind = kind_of(db, file, name)
+    kind = _asked_as(db, file, name)
     if kind in ("constant", "function"):
         text, title = _call(db, file, name, "evaluate")
         yield Offer("evaluate", title, (file, text))

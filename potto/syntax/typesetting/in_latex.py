@@ -43,7 +43,7 @@ class _Code(Exception):
 
 
 def latex(text: str, tangents: Container[str] = ()) -> str | None:
-    """An expression without `$`; None for what does not parse, or has no form in mathematics, as a fold."""
+    """An expression without `$`; None for what does not parse, or has no form in mathematics, such as a fold."""
     found = boxes(text, tangents)
     try:
         return None if found is None else _text(found)
