@@ -218,8 +218,8 @@ NO_SAMPLE = Shortfall(
     "no sample fell where it counts: the error estimate says nothing",
     "sample more (`--samples`), or integrate by `--method quadrature`",
 )
-MEETINGS = Shortfall(
-    "two surfaces coincide at single places, where a second derivative would hold a product of deltas", BESIDE
+NO_SECOND_DERIVATIVE = Shortfall(
+    "no second derivative is known here: two surfaces coincide, or one passes through a corner", BESIDE
 )
 DISAGREE = Shortfall("the second derivative is not known: its formula and numbers disagree about the first one")
 

@@ -19,8 +19,8 @@ WRONG_CALL = declare("P0509", "a function called with values that do not fit it"
 
 
 class Coincidence(PottoError):
-    """A second derivative is asked for where a surface is met outside of integrals (P0505): there is none, unless
-    nothing jumps across it (`evaluation/derivatives/sides`)."""
+    """A second derivative is asked for where a surface is met outside of integrals (P0505): what lies beside it tells
+    whether there is one (`evaluation/derivatives/sides`)."""
 
 
 def not_a_number(value: object) -> PottoError:

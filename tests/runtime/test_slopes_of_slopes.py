@@ -82,9 +82,6 @@ def test_so_with_a_branch_whose_sides_agree_to_the_second_order() -> None:
     [
         ("atan2(y, x)", (-1.0, 0.0)),
         ("atan2(y, x)", (0.0, 0.0)),
-        ("[x > 0]*x + y^2", (0.0, 1.0)),
-        ("[x > 0]*x^2 + y^2", (0.0, 1.0)),
-        ("[x > 0]*y^2 + x", (0.0, 0.0)),  # nothing jumps along x or y, but the second derivative by y, across
         ("(integral [0, 1] [u < x]*[u < 2*x - 1/2] d(u))*y", (0.5, 1.0)),
     ],
 )
@@ -92,6 +89,47 @@ def test_there_is_none_where_sides_differ(body: str, at: tuple[float, float]) ->
     with pytest.raises(potto.PottoError) as caught:
         potto.hessian(potto.compile(f"def f(x, y) {body}").f, ["x", "y"])(*at)
     assert caught.value.diagnostics[0].code == "P0505"
+
+
+def test_of_some_numbers_there_is_none() -> None:
+    """The first derivative by x jumps in one, in the other that by y does so across: these rows are not known."""
+    matrix = potto.hessian(potto.compile("def f(x, y) [x > 0]*x + y^2").f, ["x", "y"])(0.0, 1.0)
+    assert np.isnan(matrix.value[0]).all() and np.isinf(matrix.error[0]).all() and not matrix.converged
+    assert matrix.value[1].tolist() == [0, 2] and matrix.reasons[0].startswith("no second derivative is known here")
+    matrix = potto.hessian(potto.compile("def f(x, y) [x > 0]*y^2 + x").f, ["x", "y"])(0.0, 0.0)
+    assert np.isnan(matrix.value[1]).all() and matrix.value[0].tolist() == [0, 0] and not matrix.converged
+
+
+def test_those_to_either_side_are_told() -> None:
+    (note,) = potto.hessian(potto.compile("def f(x, y) [x > 0]*x^2 + y^2").f, ["x", "y"])(0.0, 1.0).notes
+    assert np.array_equal(note.backward, [[0, 0], [0, 2]]) and np.array_equal(note.forward, [[2, 0], [0, 2]])
+    corner = potto.hessian(potto.compile("def f(t) integral ([0, 1], [0, 1]) [x + y < t] d(x, y)").f)
+    at = corner(1.0)  # t^2/2 below, 1 - (2 - t)^2/2 beyond
+    assert abs(at.notes[0].backward - 1) <= 1e-9 and abs(at.notes[0].forward + 1) <= 1e-9
+    assert np.allclose(corner(np.array([0.5, 1.0, 1.5])).value[[0, 2]], [1, -1], rtol=0, atol=1e-12)
+
+
+def test_members_of_a_batch_that_have_none_spoil_no_others() -> None:
+    """min(a, b) jumps in its slope where a = b."""
+    found = potto.hessian(potto.compile("def f(a, b) integral [0, 1] [x < a]*[x < b]*x d(x)").f, ["a"])(
+        np.array([0.3, 0.5, 0.7]), 0.5
+    )
+    assert found.value[[0, 2]].tolist() == [1, 0] and np.isnan(found.value[1])
+    assert found.member_converged.tolist() == [True, False, True]
+
+
+@pytest.mark.parametrize(
+    ("body", "at", "bend"),
+    [
+        ("integral [0, 1] (sum k in 0..3 ([x < k*t/3]*x)) d(x)", 0.5, 14 / 9),  # of k^2 t^2/18, with k = 0 among them
+        ("integral ([0, 1], [0, 1]) (sum k in 0..3 ([x < k*t*y/3]*x)) d(x, y)", 0.5, 14 / 27),
+        ("integral [0, 1] [x < t*0]*x d(x) + t^2", 0.5, 2),
+        ("integral [0, 1] [x < t^2] d(x)", 0.0, 2),  # rests there but for a moment: nothing at t, something beside
+    ],
+)
+def test_roots_that_rest_on_a_bound(body: str, at: float, bend: float) -> None:
+    found = potto.hessian(potto.compile(f"def f(t) {body}").f)(at)
+    assert abs(found.value - bend) <= found.error + 1e-14 and found.error <= 1e-9 and found.converged
 
 
 def test_derivatives_of_a_power_of_nothing() -> None:

@@ -314,15 +314,21 @@ class JumpTerm(Struct, frozen=True):
         return found
 
 
-def jumps(body: Term, variables: Iterable[str], rate: Rate) -> list[JumpTerm]:
-    """The distribution part of the derivative of an integrand, surface by surface; coincident ones as one."""
+def jumps(body: Term, variables: Iterable[str], rate: Rate, within: tuple[Term, ...] = ()) -> list[JumpTerm]:
+    """The distribution part of the derivative of an integrand, surface by surface; coincident ones as one. within: what
+    rates are made of that may jump as well: there it is the jump of the integrand times the rate that counts."""
     groups: dict[Term, list[Branch]] = {}
-    for item in branches_of(body, variables):
+    for item in branches_of(tuple_((body, *within)), variables):
         groups.setdefault(normalized_surface(item.surface)[0], []).append(item)
+    both = frozenset(postorder(*within))
     found: list[JumpTerm] = []
     for members in groups.values():
         surface = members[0].surface
-        jump = _jump_at(body, surface, [(b, _side(b.surface, surface, ())) for b in members], rate)
+        sides = [(b, _side(b.surface, surface, ())) for b in members]
+        if both.isdisjoint(members):
+            jump = _jump_at(body, surface, sides, rate)
+        else:
+            jump = _jump_at(scaled(body, rate(surface)), surface, sides, lambda _: ONE)
         found += [] if jump is None else [jump]
     return found
 

@@ -129,6 +129,8 @@ def _next(node: Integral, wanted: Roots) -> list[Term] | None:
             return [*alone, with_integrand(node, body)]
     if reason is None or level_sets.level_set(node) is not None:
         return None
+    if wanted is Roots.STEADY and len(deltas) == len(node.variables):  # they leave points, hardly where one turns back
+        return _next(node, Roots.ALL)
     raise NoClosedForm(f"two surfaces meet, neither of which can be solved for a variable: {reason}")
 
 

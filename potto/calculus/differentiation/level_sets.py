@@ -9,8 +9,9 @@ The derivative follows from that of the delta, delta'(psi) = grad psi . grad del
 
     D int f delta(psi) = int (D f - div(f v)) delta(psi) + sum of int [f] (D phi - v.grad phi) delta(phi) delta(psi)
 
-with v = D psi grad psi/|grad psi|^2, summed over the surfaces phi at which f jumps, the bounds among them. It is the
-implicit function theorem: -v is how the level set moves along its normal.
+with v = D psi grad psi/|grad psi|^2, summed over the surfaces phi at which f jumps, the bounds among them; where psi
+has a kink v jumps as well, and [f (D phi - v.grad phi)] counts. It is the implicit function theorem: -v is how the
+level set moves along its normal.
 """
 
 from __future__ import annotations
@@ -203,7 +204,7 @@ def transported(node: Integral, known: LevelSet, rate: Rate, slope: Slope) -> li
     inside = [rate(factor), *(_negative(slope(scaled(factor, v), name)) for name, v in velocity.items())]
     whole = total([part for part in inside if not vanishes(part)], zero_like(factor))
     found: list[Term] = [] if vanishes(whole) else [with_integrand(node, scaled(whole, here))]
-    for item in jumps(factor, node.variables, swept):
+    for item in jumps(factor, node.variables, swept, tuple(velocity.values())):
         found.append(with_integrand(node, scaled(item.contribution, here)))
     if len(node.variables) > 1:
         found += _at_bounds(node, scaled(factor, here), swept, velocity)

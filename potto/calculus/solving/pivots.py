@@ -89,8 +89,8 @@ def _solved(node: Integral, surface: Term, order: Sequence[str], wanted: Roots) 
     reasons: list[str] = []
     for name in order:
         found = sections(surface, name, plain=wanted is Roots.READ)
-        turning = found.turning if wanted is Roots.STEADY and isinstance(found, Sections) else ()
-        if any(turn.free & frozenset(node.variables) for turn in turning):
+        steep = found.steep if wanted is Roots.STEADY and isinstance(found, Sections) else ()
+        if any(edge.free & frozenset(node.variables) for edge in steep):
             reasons.append(f"it turns back along `{name}`")
         elif isinstance(found, Sections) and _is_a_factor(node, surface, name, found):
             reasons.append(f"another part of it may run along `{name}`")

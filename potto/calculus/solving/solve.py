@@ -17,17 +17,17 @@ from msgspec.structs import replace
 
 from potto.calculus.algebra.polynomial_in import collect
 from potto.calculus.algebra.radicals import NAN, guarded
-from potto.calculus.algebra.ranges import positive, range_of, vanishing
+from potto.calculus.algebra.ranges import positive
 from potto.calculus.algebra.rational_form import settled, shorter
 from potto.calculus.solving.isolate import Guard, IsolationStep, Stuck, step
 from potto.calculus.solving.reduce_occurrences import split
+from potto.calculus.solving.turning import steep, turning
 from potto.core.normal_form import as_term, normal_form
 from potto.core.polynomials import monomial_term, shared_by, without
 from potto.core.printer import format_term
 from potto.core.terms import (
     ONE,
     ZERO,
-    Branch,
     Const,
     If,
     Prim,
@@ -72,6 +72,7 @@ class Sections(Struct, frozen=True):
     roots: terms over the other variables; nan where that root does not exist.
     complete: these, with `families`, are all the real roots. If not, `reason` says what is missing.
     turning: terms over the other variables; roots appear, merge, disappear or run off only where one of them is 0.
+    steep: those of them where roots may move infinitely fast.
     families: periodic roots.
     poles, pole_families: where the surface can change its sign without being 0 (1/(x - t), tan x).
 
@@ -85,6 +86,7 @@ class Sections(Struct, frozen=True):
     poles: tuple[Term, ...] = ()
     pole_families: tuple[Family, ...] = ()
     reason: str = ""
+    steep: tuple[Term, ...] = ()
 
 
 class Unsolvable(Struct, frozen=True):
@@ -130,11 +132,12 @@ def sections(surface: Term, name: str, plain: bool = False) -> Sections | Unsolv
     return Sections(
         tuple(dict.fromkeys(roots)),
         not reasons,
-        _turning(everything, indices),
+        turning(everything, indices),
         tuple(families),
         tuple(r for r in dict.fromkeys(poles.roots) if r not in roots),
         tuple(poles.families),
         reasons[0] if reasons else "",
+        steep(everything, indices),
     )
 
 
@@ -312,42 +315,7 @@ def _singular(surface: Term, name: str) -> Iterable[Goal]:
                 yield Goal(node.args[0], ZERO, (Guard(neg(node.args[1])),))
 
 
-# Where roots come and go
-
-
-def _turning(roots: Iterable[Term], indices: frozenset[str]) -> tuple[Term, ...]:
-    """Radicands, divisors, arguments of log, ... met in the roots: a root comes, goes or turns where one is 0."""
-    found: dict[Term, None] = {}
-    for node in postorder(*roots):
-        for edge in _edges(node):
-            for term in vanishing(_mostly(edge)):  # the surface and the cases of a branch are looked at on their own
-                if not isinstance(term, Branch) and not term.free & indices:
-                    found.setdefault(neg(term) if neg(term) in found else term)
-    return tuple(found)
-
-
-def _mostly(term: Term) -> Term:
-    """The other case of a branch whose surface is nowhere positive: that changes no sides."""
-    if isinstance(term, Branch) and range_of(term.surface).hi <= 0:
-        return term.orelse
-    return term
-
-
-def _edges(node: Term) -> tuple[Term, ...]:
-    match node:
-        case Branch():
-            return () if _mostly(node) is not node else (node.surface,)
-        case Prim(op="div", args=(_, below)):
-            return () if positive(below) else (below,)
-        case Prim(op="pow", args=(base, exponent)):
-            whole = isinstance(exponent, Const) and exponent.value.is_integer() and exponent.value > 0
-            return () if whole else (base,)
-        case Prim(op="mul" | "add" | "neg"):
-            return ()
-        case Prim(op=op, args=args) if op in PRIMITIVES:
-            return (*PRIMITIVES[op].edges(*args), *PRIMITIVES[op].kinks(*args))
-        case _:
-            return ()
+# Where inner functions turn
 
 
 def _stops(term: Term, name: str) -> tuple[Term, ...] | None:

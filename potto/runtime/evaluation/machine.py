@@ -37,8 +37,7 @@ from potto.core.terms import (
 from potto.core.terms import Delta as DeltaTerm
 from potto.diagnostics import PottoError
 from potto.integrate.costs import Costs
-from potto.integrate.events import MEETINGS, Event, Events, Members
-from potto.integrate.pieces import STRAY
+from potto.integrate.events import NO_SECOND_DERIVATIVE, Event, Events, Members
 from potto.kernels import errors
 from potto.kernels.cells import Cell, Ints, Number, Pattern, Trace, Value, pad, pattern
 from potto.kernels.chunks import at_points, many
@@ -333,13 +332,9 @@ class Machine:
     def falls(self, surface: Number, strict: bool) -> tuple[Any, Any]:
         """Which side a surface falls on, and nan wherever it is nan."""
         mask = surface > 0 if strict else surface >= 0
-        met = np.count_nonzero(surface == 0) if self.directions and self.record.second and not self.aside else 0
-        if met and not self.root and STRAY * met < np.size(surface):
-            self.note(MEETINGS)  # at single nodes: the apex of a cone
-        elif met:
-            raise (errors.Coincidence if self.root else PottoError)([PRODUCT_OF_DELTAS(
-                errors.NOWHERE,
-                "no second derivative is known here: two surfaces coincide, or one passes through a corner",
+        if self.root and self.directions and self.record.second and not self.aside and np.any(surface == 0):
+            raise errors.Coincidence([PRODUCT_OF_DELTAS(
+                errors.NOWHERE, NO_SECOND_DERIVATIVE.message,
                 notes=("where both jump, it holds a product of deltas on the same surface, and does not exist",),
                 help="move the parameters apart, or differentiate only once",
             )])  # fmt: skip

@@ -15,7 +15,8 @@ import numpy as np
 from potto.calculus.surfaces.trace import spine
 from potto.core.terms import App, Hole, If, Integral, Lam, Term, postorder
 from potto.diagnostics import PottoError
-from potto.integrate.events import OneSidedDerivatives, TwoSided
+from potto.integrate.events import NO_SECOND_DERIVATIVE, OneSidedDerivatives, TwoSided
+from potto.integrate.rules.gauss import EPS
 from potto.kernels.cells import (
     Array,
     Bools,
@@ -31,6 +32,7 @@ from potto.kernels.cells import (
 )
 from potto.kernels.errors import Coincidence
 from potto.runtime.answers.allowances import NOTHING, Allowed
+from potto.runtime.answers.convergence import merged
 from potto.runtime.evaluation.derivatives.beside import SAME as ALIKE
 from potto.runtime.evaluation.derivatives.beside import Parts, approached, moved, one_direction, parameter_step
 from potto.runtime.evaluation.linker import Linker
@@ -44,11 +46,12 @@ ASKEW = 0.6180339887498949  # of the golden ratio: no multiple comes near a whol
 SAME = 1e-12  # how far apart the derivatives on both sides may be beside their errors, as a part of them
 
 
-def as_a_whole(machine: Machine, term: Term, given: Value, run: Run) -> Value:
+def as_a_whole(machine: Machine, term: Term, given: Value, run: Run, part: bool = False) -> Value:
     """What `run` gives for a machine and what is given, the value of a term or what the functions that it is give.
     Where parts have two derivatives, those of the whole on both sides are found: if they are the same, that is the
     derivative, else the nearer one is, and a note tells them. Raises PottoError (P0505) where a second derivative is
-    asked for just where something jumps that has not the same one on both sides.
+    asked for just where the first one jumps; in a batch only of such members nothing is known, unless it is `part` of
+    something larger, of which members may be summands.
     """
     record = machine.record
     before = record.met, len(record.edges)
@@ -58,7 +61,7 @@ def as_a_whole(machine: Machine, term: Term, given: Value, run: Run) -> Value:
         if machine.side or machine.taping:
             raise
         del record.edges[before[1] :]
-        return _across(machine, given, run, coincide)
+        return _across(machine, given, run, coincide, part)
     met = record.edges[before[1] :]
     within = all(edge.cause.variable for edge in met)  # what an integral has met, none of the numbers that it is given
     if not met or machine.side or machine.taping or (within and _one_integral(machine.linker, term)):
@@ -82,30 +85,55 @@ def as_a_whole(machine: Machine, term: Term, given: Value, run: Run) -> Value:
     return map_cells(value, lambda cell: Cell(cell.v, cell.e, *map(tuple, next(rows))))
 
 
-def _across(machine: Machine, given: Value, run: Run, coincide: Coincidence) -> Value:
-    """The value where a surface is met across which nothing jumps, as that of the cut of `atan2` right of the origin.
-
-    Second derivatives by each parameter are those of the branch that is taken. They are the same on the other side if
-    in a direction that no surface runs along what lies beside the parameters leads to what they come to, on both sides.
+def _across(machine: Machine, given: Value, run: Run, coincide: Coincidence, part: bool) -> Value:
+    """The value where a surface is met of which a second derivative depends. The branch that is taken has it, if in a
+    direction that no surface runs along what lies beside the parameters leads to it on both sides: then nothing jumps,
+    as across the cut of `atan2` right of the origin, or the surface stays where it is. Else those to the sides count.
+    Of members for which one is infinite nothing is known; if it is so for all, or in a part, that is an error.
     """
-    batch, known = _batch(given), len(machine.record.edges)
-    value = pad(run(machine.changed(aside=True), given), machine.directions)
+    batch, known, aside = _batch(given), len(machine.record.edges), machine.changed(aside=True)
+    value = pad(run(aside, given), machine.directions)
     v, e, slopes, off = _numbers(value, machine.directions, batch)
+    met = machine.record.edges[known:]
     del machine.record.edges[known:]
     weights: Array = 0.5 + ASKEW * np.arange(1.0, machine.directions + 1.0) % 1
-    here = v, e, *(np.einsum("nd...,d->n...", rows, weights)[:, None] for rows in (slopes, off))
+
+    def mixed(rows: Array) -> Array:
+        return np.asarray(np.einsum("nd...,d->n...", rows, weights)[:, None])
+
+    here, across = (v, e, slopes, off), (v, e, mixed(slopes), mixed(off))
     try:
-        sides = _both(
-            machine.with_directions(1), map_cells(given, lambda cell: _mixed(cell, weights)), None,
-            lambda own, moving, side: _led_to(own, moving, run, here, side),
+        crossing = _both(
+            aside.with_directions(1), map_cells(given, lambda cell: _mixed(cell, weights)), None,
+            lambda own, moving, side: _led_to(own, moving, run, across, side),
         )  # fmt: skip
+        if _agree(crossing, across, slopes).all():
+            return value
+        sides = _both(aside, given, None, lambda own, moving, side: _led_to(own, moving, run, here, side))
     except PottoError:
         raise coincide from None
-    size = ALIKE * np.max(np.abs(slopes), axis=(0, 1))
-    for t, et in sides:
-        if not ((here[3] + et <= size) & (np.abs(t - here[2]) <= size)).all():
+    t, et, same = _chosen(here, sides, True)
+    finite = [np.isfinite(t).all(axis=(0, 1)) for t, _ in (*crossing, *sides)]
+    differs = bool(met) & ~np.asarray(True if same is None else same)
+    exists = np.all(finite, axis=0) & (differs | _agree(crossing, (v, e, mixed(t), mixed(et)), t))
+    if not exists.all():
+        if part or not exists.any():
             raise coincide
-    return value
+        merged(machine.record.shortfalls, {NO_SECOND_DERIVATIVE: ~exists})
+        t, et = np.where(exists, t, np.nan), np.where(exists, et, np.inf)
+    if same is not None and met:
+        machine.record.edges.append(_note(met[0].cause, same | ~exists, t.shape, (...,), sides))
+    rows = iter(zip(t, et, strict=True))
+    return map_cells(value, lambda cell: Cell(cell.v, cell.e, *map(tuple, next(rows))))
+
+
+def _agree(sides: Sides, here: Parts, like: Array) -> Bools:
+    """For which members both sides have the slopes that are here, in the size of others."""
+    v, _, slopes, off = here
+    size = ALIKE * np.maximum(np.max(np.abs(like), axis=(0, 1)), EPS * np.max(np.abs(v), axis=0))
+    with np.errstate(invalid="ignore"):
+        near = [(off + et <= size) & (np.abs(t - slopes) <= size) for t, et in sides]
+    return np.asarray(np.all(near, axis=(0, 1, 2)))
 
 
 def _mixed(cell: Cell, weights: Array) -> Cell:

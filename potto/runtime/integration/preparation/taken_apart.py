@@ -15,4 +15,8 @@ from potto.runtime.evaluation.machine import Machine
 def together(machine: Machine, term: Term, env: dict[str, Value]) -> Value:
     """The value of what an integral is equal to, with the derivatives of the whole."""
     function, given = function_of(term), tuple(env[name] for name in sorted(term.free))
-    return as_a_whole(machine, term, given, lambda own, values: own.run(function, list(values), None))  # type: ignore[arg-type]
+
+    def run(own: Machine, values: Value) -> Value:
+        return own.run(function, list(values), None)  # type: ignore[arg-type]
+
+    return as_a_whole(machine, term, given, run, part=True)
