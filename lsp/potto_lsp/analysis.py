@@ -289,6 +289,11 @@ class Analysis:
         if not self.has_kept:
             self._kept = None
 
+    def take_all_kept(self) -> None:
+        """Take over all that is left of it."""
+        while self.has_kept:
+            self.take_kept()
+
     def keep_all(self, kept: Callable[[], None]) -> Iterator[Callable[[], None]]:
         """The steps by which what is known of the workspace is kept for later sessions. `kept` is called if nothing has
         come between them."""

@@ -5,11 +5,16 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 from lsp_client import Client
 from potto_lsp.analysis import Analysis
+from potto_lsp.client import Client as Introduced
 from potto_lsp.documents import Document
+from potto_lsp.features.diagnosing import workspace
+from potto_lsp.publishing import Publisher
 from potto_lsp.text import DocumentText
 from potto_lsp.uris import to_uri
 
@@ -177,17 +182,31 @@ def test_a_session_takes_over_what_an_earlier_one_has_kept(cache: Path, folder: 
     assert done
     later = session(folder)
     later.look_for_kept()
-    while later.has_kept:
-        later.take_kept()
+    later.take_all_kept()
     assert later.known_before == set(later.programs()) == later.taken
     later.settled = True  # nothing more is told from what was said of single files
     assert analysed(later) == set()
     assert [later.diagnostics(key) for key in later.programs()] == [earlier.diagnostics(k) for k in earlier.programs()]
     edited = session(folder, MAIN.replace("unknown", "f"))
     edited.look_for_kept()
-    while edited.has_kept:
-        edited.take_kept()
+    edited.take_all_kept()
     alone = session(folder, MAIN.replace("unknown", "f"))
     assert edited.known_before == {str(folder / "lib.po")}
     assert analysed(edited) <= {"main.po"}
     assert [edited.diagnostics(key) for key in edited.programs()] == [alone.diagnostics(k) for k in alone.programs()]
+
+
+def test_who_asks_about_the_workspace_before_it_was_checked_is_told_what_was_kept(cache: Path, folder: Path) -> None:
+    earlier = session(folder)
+    analysed(earlier)
+    for step in earlier.keep_all(lambda: None):
+        step()
+    later = session(folder)
+    later.look_for_kept()
+    publisher = Publisher(later, Introduced(), lambda method, params: None)
+    known = SimpleNamespace(publisher=publisher, checked=False)
+    ask: Any = SimpleNamespace(analysis=later, session=known, optional=lambda name: None)
+    with later.db.recording() as events:
+        items = {item["uri"]: len(item["items"]) for item in workspace(ask)["items"]}
+    assert items == {to_uri(key): len(earlier.diagnostics(key)) for key in earlier.programs()}
+    assert not any(event.query == "_analyses" for event in events if event.kind == "executed")

@@ -27,6 +27,7 @@ def workspace(ask: Ask) -> dict[str, Any]:
         for item in (known if isinstance(known, list) else ())
         if isinstance(item, Mapping)
     }
+    ask.analysis.take_all_kept()
     publisher, programs = ask.session.publisher, ask.analysis.programs()
     items: list[dict[str, Any]] = []
     for number, key in enumerate(programs):
