@@ -245,3 +245,18 @@ def test_what_differs_between_two_choices_is_one(program: str, read: str) -> Non
     facts = derivative_facts(library.db, library.put("<text>", f"def f(a, b) {program}"), "f")
     assert facts is not None
     assert explain_derivative(library.db, library.put("<text>", f"def f(a, b) {program}"), "f").tangent == read
+
+
+@pytest.mark.parametrize(
+    ("body", "read"),
+    [
+        ("integral [0, 2] [t*x > 1] d(x)", "dt/t^2*[1/t < 2 and t > 0]"),
+        ("(integral [0, 1] [v*x < t] d(x))*[v > 0]", "(dt/v - t*dv/v^2)*[v > 0 and t*v > 0 and t/v < 1]"),
+        ("integral [0, 1] [v*x^2 < t]*[v > 0] d(x)", "(dt/v - t*dv/v^2)/(2*sqrt(t/v))"),
+    ],
+)
+def test_a_size_whose_sign_conditions_tell_is_written_without_bars(body: str, read: str) -> None:
+    library = Library()
+    file = library.put("<text>", f"def f(t, v) {body}\n")
+    found = explain_derivative(library.db, file, "f").tangent
+    assert read in found and "abs" not in found and "sign" not in found

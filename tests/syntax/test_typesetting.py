@@ -63,3 +63,11 @@ def test_a_choice_breaks_before_its_sides_and_a_size_stays_whole() -> None:
     assert first.endswith("t + 1") and second.lstrip().startswith("then a") and third.lstrip().startswith("else c")
     first, second = broken("", "(" + "a" * 38 + " + |x − t|·" + "b" * 12 + ")", 50)
     assert second.lstrip().startswith("+ |x − t|")
+
+
+def test_conditions_break_where_they_are_joined() -> None:
+    """And not within one of them, although it is a sum."""
+    formula = "(r*dr + (x - t)*dt)/sqrt(r^2 - t^2)*[t^2 + x^2 <= r^2 + 2*t*x and r^2 + 2*t*x < t^2 + x^2 + 4]"
+    lines = broken("D f = ", formula, 60)
+    assert all(len(line) <= 60 for line in lines)
+    assert lines[-1].strip() == "and r^2 + 2*t*x < t^2 + x^2 + 4]"

@@ -171,7 +171,18 @@ def _tidied(known: Factors) -> Factors:
             found.times(base, exponent % 2 - exponent)
         if isinstance(base, Prim) and base.op == "sign":
             _signed(found, base)
+        if isinstance(base, Prim) and base.op == "abs" and exponent.denominator == 1:
+            _sized(found, base, int(exponent))
     return found
+
+
+def _sized(found: Factors, size: Prim, exponent: int) -> None:
+    """abs(v) as v or -v where the conditions tell the sign of v."""
+    told = sign_where(found.conditions, size.args[0])
+    if told is not None:
+        found.times(size, -exponent)
+        found.times(size.args[0], exponent)
+        found.coefficient *= told[0] ** abs(exponent)
 
 
 def is_parity(base: Term) -> bool:

@@ -142,8 +142,7 @@ def _of_integral(title: str, item: IntegralText, show: Show) -> list[str]:
     parts += [(text, "boundary") for text in item.deltas]
     head = f"{title} = "
     for number, (text, kind) in enumerate(parts):
-        formula = broken("" if number else head, show(item.over(text)), WIDTH)
-        formula = formula if not number else [f"{' ' * (len(head) - 2)}+ {formula[0]}", *formula[1:]]
+        formula = broken(f"{'+ ':>{len(head)}}" if number else head, show(item.over(text)), WIDTH)
         lines += [*formula[:-1], f"{formula[-1]}   # {kind}"]
     lines += [line for text in item.bounds for line in _moving(show(text))]
     lines += [f"  + {meets(show(where))}" for where in item.continuous]

@@ -1,7 +1,7 @@
 """Long formulas over several lines.
 
-Owns `broken`. A line breaks before the sides of a choice or the signs of a sum, the outermost one or that between the
-farthest parentheses; where there is no long one, before a factor.
+Owns `broken`. A line breaks before the sides of a choice, the signs of a sum or what joins conditions, the outermost
+one or that between the farthest parentheses; where there is no long one, before a factor.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from itertools import pairwise
 
 _SIGNS = (" + ", " - ", " − ")
 _SIDES = (" then ", " else ")
+_JOINTS = (" and ", " or ", " ∧ ", " ∨ ")
 _FACTORS = ("·", "*")
 _OUTSIDE = -1
 _SHORT = 40  # characters between parentheses that stay together
@@ -40,9 +41,10 @@ def _broken(line: str, start: int, indent: int, width: int, deep: int) -> list[s
 
 
 def _places(text: str) -> list[int]:
-    """Where to break: before the sides of a choice or the signs of one sum, or before factors."""
+    """Where to break: before the sides of a choice, the signs of one sum, conditions that are joined, or factors."""
     choices: dict[int, list[int]] = {}
     sums: dict[int, list[int]] = {}
+    joints: dict[int, list[int]] = {}
     factors: dict[int, list[int]] = {}
     ends: dict[int, int] = {}
     around = [_OUTSIDE]
@@ -53,12 +55,15 @@ def _places(text: str) -> list[int]:
             around.append(i)
         elif char in ")]}" and len(around) > 1:
             ends[around.pop()] = i
+        elif i and text.startswith(_JOINTS, i) and around[-1] != _OUTSIDE:
+            joints.setdefault(around[-1], []).append(i)
         elif i and text.startswith(_SIDES, i):
             choices.setdefault(around[-1], []).append(i)
         elif i and text.startswith(_SIGNS, i):
             sums.setdefault(around[-1], []).append(i)
         elif i and char in _FACTORS:
             factors.setdefault(len(around), []).append(i)
+    sums |= joints  # conditions are told apart before their sides are
     sums |= choices  # a choice reaches further than a sum
     if _OUTSIDE in sums:
         return sums[_OUTSIDE]
