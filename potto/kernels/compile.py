@@ -41,8 +41,8 @@ def references(term: Term) -> tuple[Global, ...]:
 def kernel(lam: Lam, patterns: tuple[Pattern, ...], directions: int, rounding: bool, rt: Runtime) -> Kernel:
     """The kernel of a function for arguments of these patterns; from the cache where it is known."""
     callees = tuple(rt.inexact(g) for g in references(lam.body))
-    kinks = (rt.side, rt.root) if directions and bends(lam.body) else None
-    key = (lam.digest, patterns, directions, rounding, rt.taping, callees, kinks)
+    place = (rt.side, rt.root) if (directions and bends(lam.body)) or any(callees) else None
+    key = (lam.digest, patterns, directions, rounding, rt.taping, callees, place)
     with _cache_lock:
         found = _cache.get(key)
         if found is not None:

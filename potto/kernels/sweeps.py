@@ -1,7 +1,7 @@
 """Derivatives from a tape: swept from an answer back to the seeds, or pushed forward along a few of them.
 
-Owns `swept`, `pushed` and `reached`. Swept back, a tape gives the derivatives by all seeds at the cost of a few values
-whatever their number (reverse accumulation); pushed forward, it gives tangents.
+Owns `swept`, `adjoints`, `pushed` and `reached`. Swept back, a tape gives the derivatives by all seeds at the cost of a
+few values whatever their number (reverse accumulation); pushed forward, it gives tangents.
 
 An edge keeps with its slope how far off that may be. To first order an error is then a sum over edges: the sensitivity
 of the answer, along all paths without regard to sign, times what the slope is off, times how far the seeds can have
@@ -42,24 +42,34 @@ class Accumulated(Struct, frozen=True):
 
 def swept(answers: Sequence[tuple[Node, Any]]) -> dict[Node, Swept]:
     """The derivatives of a sum of answers, each times a weight, by every seed, and how far off they may be."""
+    found: dict[Node, Swept] = {}
+    whole = [(node, Accumulated(weight, abs(weight), 0.0, _is_whole(weight))) for node, weight in answers]
+    for seed, own in adjoints(whole).items():
+        nowhere = own.value != own.value
+        found[seed] = own.value, np.where(nowhere, np.inf, own.error) if np.any(nowhere) else own.error
+    return found
+
+
+def adjoints(answers: Sequence[tuple[Node, Accumulated]]) -> dict[Node, Accumulated]:
+    """What comes to every seed of what is known of answers: of derivatives by them that are off, how far these of the
+    seeds are."""
     sums: dict[Node, Accumulated] = {}
-    for node, weight in answers:
-        _gather(sums, node, Accumulated(weight, abs(weight), 0.0, _is_whole(weight)))
+    for node, part in answers:
+        _gather(sums, node, part)
     marks: dict[Node, Any] = {}
 
     def used(node: Node) -> Any:
         if not marks:
-            marks.update(_marked((node, np.not_equal(weight, 0)) for node, weight in answers))
+            marks.update(_marked((node, np.not_equal(part.value, 0)) for node, part in answers))
         return marks[node]
 
-    found: dict[Node, Swept] = {}
+    found: dict[Node, Accumulated] = {}
     order = in_order([node for node, _ in answers])
     most = _largest(order, len(answers))
     for node in reversed(order):
         own = sums.pop(node)
         if not node.edges:
-            nowhere = np.isnan(own.value)
-            found[node] = own.value, np.where(nowhere, np.inf, own.error) if np.any(nowhere) else own.error
+            found[node] = own
         for edge in node.edges:
             pull = edge.pull
             if pull is None:

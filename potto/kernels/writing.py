@@ -90,7 +90,7 @@ class Writer:
             self.env[param] = self.unpack(argument, pattern)
 
     def written(self) -> Written:
-        for node in postorder(self.lam.body, below=_at_once):
+        for node in postorder(self.lam.body, below=self.at_once):
             self.values[node] = self.emit(node)
         result = self.pack(self.values[self.lam.body])
         body = [*self.out.lines, f"return {result}"]
@@ -183,6 +183,15 @@ class Writer:
 
     # Terms
 
+    def together(self, term: Prim) -> frozenset[Term]:
+        """The summands that integrate, which are evaluated together."""
+        return integrating(term, self.rt.inexact if self.rt.root else None)
+
+    def at_once(self, term: Term) -> tuple[Term, ...]:
+        """The children that come before a term itself."""
+        together = self.together(term) if isinstance(term, Prim) else ()
+        return tuple(part for part in immediate(term) if part not in together)
+
     def emit(self, term: Term) -> Known:
         match term:
             case Const():
@@ -190,7 +199,7 @@ class Writer:
             case Var():
                 return self.env[term.name]
             case Prim():
-                together = integrating(term)
+                together = self.together(term)
                 args = [self.number(a) for a in term.args if a not in together]
                 if together:
                     args.append(self.scalar(self.added(tuple(a for a in term.args if a in together))))
@@ -362,9 +371,3 @@ class Writer:
                 return self.dynamic(text, False, ())
             case Data():
                 return self.dynamic(f"rt.data({self.keep(term)})", False, ())
-
-
-def _at_once(term: Term) -> tuple[Term, ...]:
-    """The children that come before a term itself; summands that integrate are evaluated together."""
-    together = integrating(term) if isinstance(term, Prim) else ()
-    return tuple(part for part in immediate(term) if part not in together)

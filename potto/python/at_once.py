@@ -31,7 +31,8 @@ from potto.runtime.evaluation.derivatives.duals import merge
 from potto.runtime.evaluation.functions import Closure
 from potto.runtime.evaluation.machine import WATCHING, Machine
 from potto.runtime.evaluation.record import Record, watched
-from potto.runtime.integration.direct import Batches, Direct, SettledAround, SettledCall, unused
+from potto.runtime.integration.direct import Direct, SettledAround
+from potto.runtime.integration.settled_calls import Batches, SettledCall, unused
 
 # What is not the same when the same is asked again.
 TIMES = {"seconds", "compile_seconds", "plan_seconds", "stats"}
@@ -230,7 +231,8 @@ def at_once(
         return None
     direct = program.shortest(term.body)
     dual = isinstance(direct, Direct) and direct.dual
-    read = [_read(name, arg, value, dual) for name, arg, value in zip(term.params, args, values, strict=True)]
+    plain = [Cell(value.v, value.e) if machine.taping and isinstance(value, Cell) else value for value in values]
+    read = [_read(name, arg, value, dual) for name, arg, value in zip(term.params, args, plain, strict=True)]
     reads = tuple(each for each in read if each is not None)
     if direct is None or len(reads) != len(read):
         return None

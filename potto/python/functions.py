@@ -95,6 +95,7 @@ class Function(Travelling):
         self._derivative: Function | None = None
 
     def __call__(self, *args: Any, **kwargs: Any) -> Any:
+        args, kwargs = self.by_place(args, kwargs)
         known = None if kwargs else self.at_once(args)
         if known is not None:
             return known
@@ -110,6 +111,16 @@ class Function(Travelling):
             assert isinstance(self._type, FunctionType)
             return Function(self._world, self._file, self._expr, self._type.result, given)
         return self._run(given)
+
+    def by_place(self, args: tuple[Any, ...], kwargs: dict[str, Any]) -> tuple[tuple[Any, ...], dict[str, Any]]:
+        """The arguments in the order of the parameters, where they are all of these, each under its name."""
+        groups, count = self._parameter_groups if kwargs and not self._given else (), len(args)
+        if len(groups) != 1 or count + len(kwargs) != len(group := groups[0]):
+            return args, kwargs
+        try:
+            return (*args, *[kwargs[parameter.name] for parameter in group[count:]]), {}  # type: ignore[index]
+        except KeyError:
+            return args, kwargs
 
     def at_once(self, args: tuple[Any, ...], wrt: tuple[str, ...] = ()) -> Estimate | None:
         """The estimate of a call with plain numbers near those of before, with its derivatives by the parameters

@@ -175,6 +175,7 @@ class GradientFunction:
         self._wrt = wrt
 
     def __call__(self, *args: Any, **kwargs: Any) -> Gradient:
+        args, kwargs = self._function.by_place(args, kwargs)
         known = None if kwargs else self._function.at_once(args, self._wrt)
         if known is not None:
             assert isinstance(known, Gradient)
@@ -344,7 +345,7 @@ class _Run:
     def keep(self, found: Estimate, wrt: tuple[str, ...]) -> None:
         """Keep what answers a call of this kind at once, if anything does."""
         values, machine = self.moved
-        if not self.whole and all(isinstance(value, Cell) for value in values):
+        if all(isinstance(value, Cell) for value in values) and not (self.whole and self.batch.shape is not None):
             self.call.keep([value.v for value in values], values, found, wrt, machine)  # type: ignore[union-attr]
 
     def answer(self, value: Value, tangents: Any, bounds: Any) -> Estimate:

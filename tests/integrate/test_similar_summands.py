@@ -45,6 +45,44 @@ def test_parameters_of_their_own() -> None:
     assert np.max(answer.tangent_error) <= 1e-9 and answer.converged
 
 
+def test_calls_of_one_function_are_one_batch() -> None:
+    """Squares of (exp(a) - 1)*t - b, with calls and numbers of their own, through arithmetic around each."""
+    names = [f"a{k}" for k in range(N)]
+    terms = " + ".join(f"(part({name}, t) - {k / N})^2" for k, name in enumerate(names, 1))
+    m = potto.compile(f"def part(a, t) integral [0, 1] t*exp(x)*[x < a] d(x)\ndef loss(t, {', '.join(names)}) {terms}")
+    at, t = [0.9 * (k + 1) / N for k in range(N)], 1.5
+    rests = [t * math.expm1(a) - k / N for k, a in enumerate(at, 1)]
+    exact = [math.fsum(2 * rest * math.expm1(a) for rest, a in zip(rests, at, strict=True)),
+             *(2 * rest * t * math.exp(a) for rest, a in zip(rests, at, strict=True))]  # fmt: skip
+    value, gradient = m.loss(t, *at), potto.grad(m.loss, ["t", *names])(t, *at)
+    for found in (value, gradient):
+        assert abs(found.value - math.fsum(rest**2 for rest in rests)) <= found.error + ROUNDING * found.value
+        assert found.converged and found.stats["integrals"] == 1
+    size = max(map(abs, exact))
+    for slope, error, true in zip(gradient.tangent, gradient.tangent_error, exact, strict=True):
+        assert abs(slope - true) <= error + 4e-16 * size and error <= 1e-12 * size
+
+
+def test_recursions_that_add_up_calls_of_themselves() -> None:
+    """Leaves of a tree, each 1 - exp(-a): as many as the depth says."""
+    m = potto.compile("""
+def leaf(a) integral [0, 1] exp(-x)*[x < a] d(x)
+def tree(a, n)
+    if n < 1 then leaf(a) else tree(a, n - 1) + tree(0.5*a, n - 1) + tree(0.5*a, n - 2)
+""")
+
+    def tree(a: float, n: int) -> tuple[float, float]:
+        if n < 1:
+            return -math.expm1(-a), math.exp(-a)
+        (v1, s1), (v2, s2), (v3, s3) = tree(a, n - 1), tree(0.5 * a, n - 1), tree(0.5 * a, n - 2)
+        return v1 + v2 + v3, s1 + 0.5 * (s2 + s3)
+
+    found = potto.grad(m.tree, "a")(0.7, 4)
+    value, slope = tree(0.7, 4)
+    assert abs(found.value - value) <= found.error + ROUNDING * value
+    assert abs(found.tangent - slope) <= found.tangent_error + ROUNDING * slope
+
+
 def test_arrays_of_sums() -> None:
     """A sum at an array of parameters is what it is at each of them."""
     body = " + ".join(f"exp({k / N}*x)*[x < {k / N}*t]" for k in range(1, N + 1))

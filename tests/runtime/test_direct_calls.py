@@ -209,6 +209,28 @@ def test_batches_are_answered_the_same_from_the_second_call_on(
                 assert list(map(str, found.notes)) == list(map(str, general.notes))
 
 
+def test_arguments_by_name_are_those_by_place(monkeypatch: pytest.MonkeyPatch) -> None:
+    """They are answered at once as well; what is missing or unknown is told as ever."""
+    f, answered = potto.compile("def f(a, b) integral [0, 1] exp(b*x)*[x < a] d(x)").f, []
+    at_once = Call.at_once
+
+    def spied(self: Call, *given: Any) -> potto.Estimate | None:
+        found = at_once(self, *given)
+        answered.append(found is not None)
+        return found
+
+    monkeypatch.setattr(Call, "at_once", spied)
+    for call in (f, potto.grad(f, ["b", "a"])):
+        answered.clear()
+        by_place = call(0.5, 1.5), call(0.5, 1.5)
+        for found in (call(a=0.5, b=1.5), call(b=1.5, a=0.5), call(0.5, b=1.5)):
+            assert (found.value, found.tangent) == (by_place[1].value, by_place[1].tangent)
+        assert answered == [False, *[True] * 4] or answered == [True] * 4
+        for wrong in ({"a": 0.5}, {"a": 0.5, "c": 1.5}, {"a": 0.5, "b": 1.5, "c": 1.0}):
+            with pytest.raises(potto.PottoError):
+                call(**wrong)
+
+
 def test_batches_go_straight_to_the_integral(monkeypatch: pytest.MonkeyPatch) -> None:
     """And what is to be told of them is told as ever: at t = 1 the edge lies on the bound."""
     f, answered = potto.grad(potto.compile("def f(t) integral [0, 1] exp(x)*[x < t] d(x)").f), []

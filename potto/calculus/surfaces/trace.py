@@ -7,6 +7,7 @@ sites is a property of the term alone, so a caller and a separately compiled cal
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import lru_cache
 
 from msgspec import Struct
@@ -122,23 +123,32 @@ def immediate(term: Term) -> tuple[Term, ...]:
             return children(term)
 
 
-@lru_cache(maxsize=16384)
-def integrating(term: Prim) -> frozenset[Term]:
-    """The summands, if they are several, that are made of integrals and arithmetic, so that none has a site."""
+def integrating(term: Prim, inexact: Callable[[Term], bool] | None = None) -> frozenset[Term]:
+    """The summands, if they are several, that are made of integrals and arithmetic, so that none has a site; or of
+    calls that lead to integrals, too, where nobody forces sites: there `inexact` says which do."""
     if term.op != "add":
         return frozenset()
-    found = frozenset(arg for arg in term.args if _integrates(arg))
+    found = frozenset(arg for arg in term.args if _integrates(arg) or (inexact is not None and _calls(arg, inexact)))
     return found if len(found) > 1 else frozenset()
 
 
 _holds_integral = Holding(Integral)
 
 
+@lru_cache(maxsize=16384)
 def _integrates(term: Term) -> bool:
-    if not _holds_integral(term):
-        return False
-    kinds = {type(node) for node in outside(term, (Integral, Lam, Deriv))}
-    return Integral in kinds and kinds.isdisjoint((App, Branch, If, Sum))
+    return _holds_integral(term) and Integral in (kinds := _kinds(term)) and kinds.isdisjoint((App, Branch, If, Sum))
+
+
+def _calls(term: Term, inexact: Callable[[Term], bool]) -> bool:
+    return (
+        _holds_call(term) and App in (kinds := _kinds(term)) and kinds.isdisjoint((Branch, If, Sum)) and inexact(term)
+    )
+
+
+def _kinds(term: Term) -> set[type[Term]]:
+    """Of what kinds the parts of a term are that stand outside of integrals and functions."""
+    return {type(node) for node in outside(term, (Integral, Lam, Deriv))}
 
 
 @lru_cache(maxsize=16384)

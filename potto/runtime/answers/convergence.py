@@ -7,6 +7,7 @@ error may be then, `allowances` says.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
@@ -143,6 +144,8 @@ def steep(slopes: Iterable[Any], known: Mapping[Shortfall, Any]) -> Shortfalls:
     found: Shortfalls = {}
     if INFINITE not in known:
         for slope in slopes:
+            if slope.__class__ is float and not math.isinf(slope):  # as mostly, of many parameters
+                continue
             if np.any(where := np.isinf(slope)):
                 merged(found, {STEEP: where})
     return found

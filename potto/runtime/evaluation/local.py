@@ -1,8 +1,8 @@
 """Derivatives by what something depends on itself: fewer directions inside of it, and the chain rule outside.
 
-Owns `locally`. An integral costs a part of its value more for every direction that it carries. So it is given as few as
-there are numbers that move in its environment, or directions in which these move: a triangle of a mesh carries the
-twelve of its own, whatever else moves. Then all triangles have one kernel and one plan as well.
+Owns `locally` and `taped`. An integral costs a part of its value more for every direction that it carries. So it is
+given as few as there are numbers that move in its environment, or directions in which these move: a triangle of a mesh
+carries the twelve of its own, whatever else moves. Then all triangles have one kernel and one plan as well.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ def _off_the_tape(machine: Machine, env: Env, moving: Sequence[Cell], run: Run) 
     if few != frozenset(nodes) and (few is None or len(few) >= len(nodes)):
         found = _by_each(machine, env, moving, run)
         if found is not None:
-            return map_cells(found, lambda cell: _taped(cell, nodes))
+            return map_cells(found, lambda cell: taped(cell, nodes))
     order = sorted(every_leaf(nodes) if few is None else few, key=lambda node: node.number)
     pushes = [tuple(zip(*row, strict=True)) for row in pushed(nodes, order)]
     tangents = {id(cell): (row[0], row[1]) for cell, row in zip(moving, pushes, strict=True)}
@@ -61,7 +61,7 @@ def _off_the_tape(machine: Machine, env: Env, moving: Sequence[Cell], run: Run) 
     value = run(machine.with_directions(len(order)), _with_tangents(env, tangents, len(order)))
     here = machine.record.sided(*met)
     machine.record.taped += [(node, here) for node in order if np.any(here)]
-    return map_cells(value, lambda cell: _taped(cell, order))
+    return map_cells(value, lambda cell: taped(cell, order))
 
 
 def _by_each(machine: Machine, env: Env, moving: Sequence[Cell], run: Run) -> Value | None:
@@ -71,7 +71,8 @@ def _by_each(machine: Machine, env: Env, moving: Sequence[Cell], run: Run) -> Va
     return _quietly(machine.with_directions(m), _with_tangents(env, units, m), run)
 
 
-def _taped(cell: Cell, nodes: Sequence[Node]) -> Cell:
+def taped(cell: Cell, nodes: Sequence[Node]) -> Cell:
+    """The number with its tangents, by these nodes, as one of the tape."""
     edges = [edge for edge in zip(cell.t, nodes, cell.et, strict=bool(cell.t)) if edge[0] is not None]
     return Cell(cell.v, cell.e, (linear(*edges) if edges else None,))
 

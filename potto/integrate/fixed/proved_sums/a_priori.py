@@ -1,19 +1,19 @@
 """One integral between known cuts, straight through: no pieces, no refinement, as many nodes as were proved enough.
 
-Owns `certain`, `beside_bounds`, `proved_sum` and `Crowded`. Where all cuts are closed forms and on every cell between
-them the integrand is one analytic formula, `proved_orders` says beforehand how many nodes do. What is left is a short
-program: bounds and cuts as formulas of the variables further out, the nodes between them, the formula at the nodes,
-weighted sums. Its derivative is that of the program, whose nodes move with the parameters (Reynolds' transport theorem:
-a surface that moves takes its nodes along, so that no boundary term is left). Its rounding is kept track of as
-everywhere outside of integrals, by a running error analysis from the bounds to the sums. Whatever is not plain here is
-left to `levels`.
+Owns `certain`, `beside_bounds`, `proved_sum`, `proved_gradient` and `Crowded`. Where all cuts are closed forms and on
+every cell between them the integrand is one analytic formula, `proved_orders` says beforehand how many nodes do. What
+is left is a short program: bounds and cuts as formulas of the variables further out, the nodes between them, the
+formula at the nodes, weighted sums. Its derivative is that of the program, whose nodes move with the parameters
+(Reynolds' transport theorem: a surface that moves takes its nodes along, so that no boundary term is left). Its
+rounding is kept track of as everywhere outside of integrals, by a running error analysis from the bounds to the sums.
+Whatever is not plain here is left to `levels`.
 """
 
 from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -25,6 +25,7 @@ from potto.integrate.fixed.proved_sums.on_bounds import OnBounds, Place, Tied
 from potto.integrate.fixed.proved_sums.settled import SettledRegion, accurate
 from potto.integrate.fixed.proved_sums.sum_text import RepeatedSum
 from potto.integrate.fixed.regions import LOOSEST, Path, Places, known, region_of, settle
+from potto.integrate.fixed.steps.step_gradients import step_gradient
 from potto.integrate.fixed.steps.step_sums import SteppedCall
 from potto.integrate.fixed.straight import CLEAR, StraightIntegral, nothing
 from potto.integrate.pieces import Evaluator, Sums
@@ -233,6 +234,22 @@ def proved_sum(plan: StraightIntegral, machine: Evaluator, env: dict[str, Value]
         return _summed(plan, machine, env)
     except _NotPlain:
         return None
+
+
+def proved_gradient(
+    plan: StraightIntegral, machine: Evaluator, env: Mapping[str, Cell], moving: Sequence[str]
+) -> MovingTotals | None:
+    """The value and its derivatives by the parameters in `moving`, swept back; None where the integral is not one of
+    step functions, or something about it is not plain. machine: one without directions."""
+    if plan.steps is None or plan.choices is not None or _numbers(plan, env) is None or not _exact(plan, env):
+        return None
+    if machine.frozen or machine.side or machine.costs is not None:
+        return None
+    found = step_gradient(plan.steps, machine.tracking(), env, moving, min(machine.rtol, LOOSEST))
+    whole = None if found is None else accurate(found, [0.0] * len(found.number), machine.rtol, machine.atol)
+    if whole is not None:
+        machine.count(whole.nodes)
+    return whole
 
 
 def _summed(plan: StraightIntegral, machine: Evaluator, env: dict[str, Value]) -> MovingTotals | None:

@@ -1,14 +1,14 @@
 """The cells between the cuts of a `StepIntegral`, and how high its step functions are on them.
 
-Owns `StepCells` and `step_cells`. The cuts are put in order once; all else follows from that order: ends of cells are
-neighbours in it, heights are sums along it. That it is sure is seen by comparing neighbours. Cuts that rounding does
-not tell apart, or one from a bound, are left to others.
+Owns `StepCells`, `step_cells` and, of what is known of them, `cells_between` and `levels_of`. The cuts are put in order
+once; all else follows from that order: ends of cells are neighbours in it, heights are sums along it. That it is sure
+is seen by comparing neighbours. Cuts that rounding does not tell apart, or one from a bound, are left to others.
 """
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from typing import Any
 
@@ -36,7 +36,8 @@ class StepCells(Struct, frozen=True):
     low, width, off: (1 + k, [B,] C), with tangents: lower ends, widths, and how far both ends may be off. heights: of
     each step function its numbers on the cells and their errors, of that shape too, or (1, [B,] C) without tangents;
     None for errors of 0. moving: the directions in which ends move. fine: for whom all this is sure. inside: how many
-    are cells.
+    are cells. lower, upper: ([B,] C), the rows of the frame that are the ends. below: ([B,] R), those that lie below
+    the lower bound.
     """
 
     low: Array
@@ -46,12 +47,16 @@ class StepCells(Struct, frozen=True):
     moving: tuple[bool, ...]
     fine: Bools
     inside: Ints
+    lower: Ints
+    upper: Ints
+    below: Bools
 
     def pick(self, cells: Any) -> StepCells:
         """Those at some places of the last axis, or of the last two."""
         low, width, off = (block[..., *cells] for block in (self.low, self.width, self.off))
         heights = tuple([(x[..., *cells], None if e is None else e[..., *cells]) for x, e in self.heights])
-        return StepCells(low, width, off, heights, self.moving, self.fine, self.inside)
+        lower, upper = self.lower[..., *cells], self.upper[..., *cells]
+        return StepCells(low, width, off, heights, self.moving, self.fine, self.inside, lower, upper, self.below)
 
     def levels(self) -> list[Cell]:
         """The step functions."""
@@ -60,27 +65,35 @@ class StepCells(Struct, frozen=True):
 
 def step_cells(plan: StepIntegral, machine: Evaluator, env: dict[str, Value], batch: int | None = None) -> StepCells:
     """The cells of one member, or of a batch. machine: one that keeps track of rounding."""
-    k, shape = machine.directions, () if batch is None else (batch,)
     frame = evaluated(plan.frame, machine, {name: env[name] for name in plan.frame.params})
+    levels = levels_of(plan, machine, env)
+    return cells_between(plan, frame, levels, machine.directions, () if batch is None else (batch,))
+
+
+def cells_between(
+    plan: StepIntegral, frame: Sequence[Cell], heights: Sequence[Sequence[Cell]], k: int, shape: tuple[int, ...] = ()
+) -> StepCells:
+    """The cells between the rows of a frame, with tangents in k directions. heights: as of `levels_of`. shape: of the
+    batch."""
     places, errors = _rows(frame, k, shape)
     rows, count = _in_order(places[0], errors[0])
     ends, slack = _along(places, rows), _along(errors, rows)
     width, doubt = ends[..., 1:] - ends[..., :-1], slack[..., 1:] + slack[..., :-1]
     fine = _apart(width[0], doubt[0], count)
     below = places[0] < places[0, ..., :1]
-    heights = tuple([
+    along = tuple([
         _height(*(_numbers(plan, own) or _rows(levels, k, shape)), plan.steps[own], rows, below)
-        for own, levels in enumerate(_levels(plan, machine, env))
+        for own, levels in enumerate(heights)
     ])  # fmt: skip
     moving = tuple([any_moves(frame, d) for d in range(k)])
     return StepCells(
-        ends[..., :-1], width, doubt + EPS * (np.abs(ends[..., 1:]) + np.abs(ends[..., :-1])), heights,
-        moving, fine, count - 1,
+        ends[..., :-1], width, doubt + EPS * (np.abs(ends[..., 1:]) + np.abs(ends[..., :-1])), along,
+        moving, fine, count - 1, rows[..., :-1], rows[..., 1:], below,
     )  # fmt: skip
 
 
-def _levels(plan: StepIntegral, machine: Evaluator, env: dict[str, Value]) -> list[tuple[Cell, ...]]:
-    """The heights of each step function."""
+def levels_of(plan: StepIntegral, machine: Evaluator, env: Mapping[str, Value]) -> list[tuple[Cell, ...]]:
+    """What each step function is added up from, where that is not all numbers."""
     if all(plan.resting):
         return [()] * len(plan.steps)
     levels = evaluated(plan.heights, machine, {name: env[name] for name in plan.heights.params})

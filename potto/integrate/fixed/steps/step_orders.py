@@ -1,8 +1,9 @@
 """How many nodes are enough for the cells of one member, proved of all of them at once.
 
-Owns `enough`. To a proof (`proved_orders`) the ends of a cell and the heights of step functions on it are parameters as
-others are, and the cells are regions of these: what it takes is that of one cell, in longer arrays. It is kept, and
-holds for as long as all of these stay within their radii: that is seen by as many comparisons.
+Owns `enough`, `proved` and `StepProof`. To a proof (`proved_orders`) the ends of a cell and the heights of step
+functions on it are parameters as others are, and the cells are regions of these: what it takes is that of one cell, in
+longer arrays. It is kept, and holds for as long as all of these stay within their radii: that is seen by as many
+comparisons.
 """
 
 from __future__ import annotations
@@ -27,9 +28,10 @@ OF_ENDS = 2.0**-4
 SCALES = 1.0, 2.0**-4
 
 
-class _Proof(Struct, frozen=True):
-    """That so many nodes are enough within these radii about these numbers, (P, C) each. error: bounds of what the rule
-    leaves out of each cell, (C,)."""
+class StepProof(Struct, frozen=True):
+    """That so many nodes are enough within these radii about these numbers, (P, C) each: those of the ends of cells, of
+    the step functions, and of what else the integrand reads (`others`). error: bounds of what the rule leaves out of
+    each cell, (C,)."""
 
     middle: Array
     radius: Array
@@ -46,28 +48,43 @@ def enough(
     """How many nodes on each cell of a member, and bounds of what they leave out of the sum and of its tangents; None
     where none are proved to be enough for a part MARGIN of `rtol`, derivatives by the ends of cells included."""
     numbers = _numbers(plan, cells, env)  # (P, 1 + k, C)
-    proof = plan.proofs.get(rtol)
-    if proof is None or not proof.holds(numbers[:, 0]):
-        with making:
-            proof = _proved(plan, numbers, rtol)
-        if proof is None:
-            return None
-        plan.proofs[rtol] = proof
+    proof = _known(plan, numbers, rtol)
+    if proof is None:
+        return None
     still = numbers[:, 1:] == 0
     with np.errstate(divide="ignore", invalid="ignore"):
         rates = np.where(still, 0.0, np.abs(numbers[:, 1:]) / proof.radius[:, None]).max(axis=0)  # Cauchy's estimate
     return proof.order, [float(proof.error.sum()), *(rates @ proof.error).tolist()]
 
 
+def proved(plan: StepIntegral, cells: StepCells, env: Mapping[str, Value], rtol: float) -> StepProof | None:
+    """The proof of it."""
+    return _known(plan, _numbers(plan, cells, env), rtol)
+
+
+def others(plan: StepIntegral) -> list[str]:
+    """What an integrand reads beside its variable and step functions."""
+    return [name for name in plan.body.params if name != plan.variable and name not in plan.names]
+
+
+def _known(plan: StepIntegral, numbers: Array, rtol: float) -> StepProof | None:
+    proof: StepProof | None = plan.proofs.get(rtol)
+    if proof is None or not proof.holds(numbers[:, 0]):
+        with making:
+            proof = _proved(plan, numbers, rtol)
+        if proof is not None:
+            plan.proofs[rtol] = proof
+    return proof
+
+
 def _numbers(plan: StepIntegral, cells: StepCells, env: Mapping[str, Value]) -> Array:
     """The parameters of the cells with their tangents: ends, heights, then the others that the integrand reads."""
-    low = cells.low
-    others = [name for name in plan.body.params if name != plan.variable and name not in plan.names]
-    rows = np.zeros((2 + len(plan.names) + len(others), *low.shape))
+    low, read = cells.low, others(plan)
+    rows = np.zeros((2 + len(plan.names) + len(read), *low.shape))
     rows[0], rows[1] = low, low + cells.width
     for row, (height, _) in zip(rows[2:], cells.heights, strict=False):
         row[: len(height)] = height
-    for row, name in zip(rows[2 + len(plan.names) :], others, strict=True):
+    for row, name in zip(rows[2 + len(plan.names) :], read, strict=True):
         given = env[name]
         assert isinstance(given, Cell)
         row[0] = given.v
@@ -76,9 +93,8 @@ def _numbers(plan: StepIntegral, cells: StepCells, env: Mapping[str, Value]) -> 
     return rows
 
 
-def _proved(plan: StepIntegral, numbers: Array, rtol: float) -> _Proof | None:
-    others = [name for name in plan.body.params if name != plan.variable and name not in plan.names]
-    names, middle = [LOW, HIGH, *plan.names, *others], numbers[:, 0]
+def _proved(plan: StepIntegral, numbers: Array, rtol: float) -> StepProof | None:
+    names, middle = [LOW, HIGH, *plan.names, *others(plan)], numbers[:, 0]
     width, reach = middle[1] - middle[0], middle[1, -1] - middle[0, 0]
     cell = FrameCell(((0, 1),), plan.body.body)
     for scale in SCALES:
@@ -94,5 +110,5 @@ def _proved(plan: StepIntegral, numbers: Array, rtol: float) -> _Proof | None:
         left = rates.sum(axis=-1) <= MARGIN * rtol * abs(float(size.sum()))
         if left.any():
             number = int(left.argmax())
-            return _Proof(middle, radius, number + LEAST_NODES, errors[0, number])
+            return StepProof(middle, radius, number + LEAST_NODES, errors[0, number])
     return None
