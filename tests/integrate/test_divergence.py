@@ -61,3 +61,24 @@ def test_what_cannot_be_told_from_a_divergent_integral_is_no_number_either() -> 
 def test_singular_integrals_that_converge_are_numbers(text: str, t: float, exact: float) -> None:
     found = potto.compile(f"def f(t) {text}").f(t=t)
     assert abs(found.value - exact) <= found.error <= 1e-6
+
+
+@pytest.mark.parametrize("length", [1e6, 1e8, 1e10])
+def test_what_is_narrow_beside_its_range_is_integrated(length: float) -> None:
+    found = potto.compile("def f(L) integral [-L, L] 1/(1 + x^2) d(x)").f(length)
+    assert found.converged
+    assert abs(found.value - 2 * math.atan(length)) <= found.error <= 1e-10 * math.pi  # what is asked for by default
+
+
+@pytest.mark.parametrize("length", [1e12, 1e14, 1e15, 1e16, 1e17])
+def test_what_is_far_too_narrow_is_not_infinite(length: float) -> None:
+    found = potto.compile("def f(L) integral [-L, L] 1/(1 + x^2) d(x)").f(length)
+    assert not found.converged
+    assert abs(found.value - 2 * math.atan(length)) <= found.error < math.inf
+
+
+@pytest.mark.parametrize("width", [1e-30, 1e-100])
+def test_growth_that_stops_beside_an_end_is_not_infinite(width: float) -> None:
+    found = potto.compile("def f(w) integral [0, 1] 1/(w + x) d(x)").f(width)
+    assert not found.converged
+    assert abs(found.value - math.log1p(1 / width)) <= found.error

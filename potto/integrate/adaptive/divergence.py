@@ -158,10 +158,15 @@ def _noise(work: PanelBatch, p: Pieces, errors: Array, blamed: Array) -> Bools:
 
 def _growth(work: PanelBatch, index: Ints, high: bool) -> Array:
     """1 or -1 where the integrand goes to inf or -inf at an end too fast to be integrated, nan where it is not known
-    what it does there, 0 where it does nothing of the kind, next to what it is elsewhere: (m, S)."""
+    what it does there, 0 where it does nothing of the kind, next to what it is elsewhere, or no longer does close to
+    the end: (m, S)."""
     seg = work.seg.pick(index)
     turning = np.isin(seg.kind, (substitution.LEFT, substitution.RIGHT, substitution.BOTH))
+    end = np.abs(seg.b if high else seg.a)
     near = np.where(turning[:, None], np.array(NEAR_TURNING), np.array(NEAR))
+    near = np.concatenate((near, near[:, 2:3]), axis=1)
+    if (nearer := ~turning & (end < NEAREST * NEAREST * (seg.b - seg.a))).any():  # a peak may be narrower by far
+        near[nearer, -1] = LEAST
     u, rest = (1 - near, near) if high else (near, 1 - near)
     x, slope, label = substitution.points(seg, u, rest)
     h, inner = work.values(seg, index, x, label, slope)
@@ -173,7 +178,8 @@ def _growth(work: PanelBatch, index: Ints, high: bool) -> Array:
         off = POWER + 4 * EPS * np.abs(seg.b if high else seg.a) / nearest
         least = 1 - np.where(np.isfinite(off), off, POWER)
         steady = np.isinf(h[..., 2]) | ((power >= least) & (before >= least))
-        counts = ~(np.abs(h[..., 2]) * near[:, 2] < BLAMED * np.abs(h[..., 3:]).max(axis=-1))
+        counts = ~(np.abs(h[..., 2]) * near[:, 2] < BLAMED * np.abs(h[..., 3:-1]).max(axis=-1))
+        counts &= ~(np.abs(h[..., -1]) * near[:, -1] < BLAMED * np.abs(h[..., 2]) * near[:, 2])
     if inner is not None:  # what integrals further in may be off says nothing of growth
         own = inner.reshape(work.width, -1, *inner.shape[1:])[:, 0, :, 2]
         counts &= ~(np.isfinite(own) & (np.abs(h[..., 2]) <= NOISE * own))

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from potto.integrate.adaptive.reynolds import Totals
+from potto.integrate.adaptive.reynolds import Totals, added
 from potto.integrate.columns import distinct
 from potto.integrate.events import LATE
 from potto.integrate.panels.iterated import siblings
@@ -48,6 +48,8 @@ class Tally:
 
     For the outermost variable the magnitude of the result counts; further in, where results are added up once more,
     the largest magnitude of what is added up, among all that go into the same answer.
+
+    fixed: which derivatives are told by their fixed form, (m, k, B); None as long as either may.
     """
 
     def __init__(self, work: PanelBatch, p: Pieces) -> None:
@@ -55,6 +57,7 @@ class Tally:
         self.gross: Array = np.zeros(work.batch)
         self.total: Array = np.zeros((work.width * (1 + work.k), work.batch))
         self.scale: Array | None = None
+        self.fixed: Bools | None = None
         self.add(work, p, 1)
 
     def add(self, work: PanelBatch, p: Pieces, sign: int) -> None:
@@ -86,13 +89,35 @@ class Tally:
         rows[:, 1:] = rows.max(axis=1, keepdims=True)
         return rows.reshape(largest.shape)
 
-    def shares(self, work: PanelBatch, owner: Ints) -> Array:
-        """The error that one piece of each of these integrals may have: (m * (1 + k), P)."""
+    def limits(self, work: PanelBatch) -> Array:
+        """The error that each of these integrals may have: (m * (1 + k), B)."""
         less = spared(work)
         if self.scale is None:
             self.scale = np.maximum(work.machine.atol, work.machine.rtol * self.sizes(work, less))
-        shares: Array = self.scale[:, owner] / (2 * self.count[owner])
-        return shares if less is None else shares * less[owner]
+        return self.scale if less is None else self.scale * less
+
+    def shares(self, work: PanelBatch, owner: Ints) -> Array:
+        """The error that one piece of each of these integrals may have: (m * (1 + k), P)."""
+        shares: Array = self.limits(work)[:, owner] / (2 * self.count[owner])
+        return shares
+
+    def settle_forms(self, work: PanelBatch, p: Pieces) -> bool:
+        """Settle which form tells each derivative, the one with the smaller bound. Whether that asks for more: as long
+        as either may, pieces do that are accurate in one, though of their sum only one is the answer."""
+        k = work.k
+        if not work.both or self.fixed is not None:
+            return False
+        error, floor = added(work, np.concatenate((p.error, p.floor)), p, 2)
+        bound = error + floor
+        fixed = bound[:, 1 + k :] < bound[:, 1 : 1 + k]
+        left = np.where(fixed, error[:, 1 + k :], error[:, 1 : 1 + k])
+        limits = self.limits(work).reshape(work.width, 1 + k, -1)[:, 1:]
+        if work.endless is not None:
+            left = np.where(work.endless == 0, left, 0.0)
+        if not (left > limits).any():
+            return False
+        self.fixed = fixed
+        return True
 
 
 def spared(work: PanelBatch) -> Array | None:
@@ -125,10 +150,11 @@ def too_coarse(work: PanelBatch, p: Pieces, ends: Any, tally: Tally) -> Any:
     rows, m = p.integral.shape[0] // work.width, work.width
     error, floor = p.error.reshape(m, rows, -1), p.floor.reshape(m, rows, -1)
     k = work.k
-    if work.both:  # per direction the better of the two forms
-        better = np.minimum(error[:, 1 : 1 + k], error[:, 1 + k :])
-        error = np.concatenate((error[:, :1], better), axis=1)
-        floor = floor[:, : 1 + k]
+    if work.both:  # per direction the better of the two forms, or the one that tells
+        told = error[:, 1 + k :] < error[:, 1 : 1 + k] if tally.fixed is None else tally.fixed[:, :, owner]
+        error, floor = (
+            np.concatenate((x[:, :1], np.where(told, x[:, 1 + k :], x[:, 1 : 1 + k])), axis=1) for x in (error, floor)
+        )
     if work.endless is not None:
         error = error.copy()
         error[:, 1 : 1 + k] = np.where(work.endless[:, owner] == 0, error[:, 1 : 1 + k], 0.0)

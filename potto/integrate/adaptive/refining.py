@@ -78,7 +78,11 @@ def integrated(work: PanelBatch) -> Sums:
     work.endless = endless(work, found)
     tally = Tally(work, fresh)
     work.filled = filled(work, fresh)
-    done = at_seams(work, refine(work, fresh, ends, tally))
+    done = refine(work, fresh, ends, tally)
+    if tally.settle_forms(work, done):
+        done.excess[:] = 0.0
+        done = refine(work, done, ends, tally)
+    done = at_seams(work, done)
     for _ in range(DOUBTFUL_ROUNDS):
         found = totals(work, done, ends)
         bad = doubtful(work, done, found)

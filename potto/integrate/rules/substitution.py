@@ -73,10 +73,8 @@ def points(seg: Segments, u: Array, rest: Array | None = None) -> tuple[Array, A
 
     rest: 1 - u, where it is known better than it can be got from u.
     """
-    a, b = seg.a[:, None], seg.b[:, None]
     if not seg.kind.any():
-        width = b - a
-        return a + width * u, width, u
+        return _along(seg, u, rest), (seg.b - seg.a)[:, None], u
     u = np.broadcast_to(u, (seg.a.size, u.shape[1]))
     rest = 1.0 - u if rest is None else rest
     x, slope, label = np.empty_like(u), np.empty_like(u), np.empty_like(u)
@@ -125,9 +123,17 @@ def label(seg: Segments, x: Array) -> Array:
         return np.where(seg.kind[:, None] < UP, (x - a) / (b - a), 0.0)
 
 
+def _along(seg: Segments, u: Array, rest: Array | None) -> Array:
+    """Points by their distance from the end that is nearer to 0, around which doubles are as close as one likes."""
+    a, b = seg.a[:, None], seg.b[:, None]
+    x: Array = a + (b - a) * u
+    if rest is None or not (from_above := np.abs(seg.b) < np.abs(seg.a)).any():
+        return x
+    return np.where(from_above[:, None], b - (b - a) * rest, x)
+
+
 def _linear(seg: Segments, u: Array, rest: Array) -> tuple[Array, Array, Array]:
-    width = (seg.b - seg.a)[:, None]
-    return seg.a[:, None] + width * u, width * np.ones_like(u), u
+    return _along(seg, u, rest), (seg.b - seg.a)[:, None] * np.ones_like(u), u
 
 
 def _left(seg: Segments, u: Array, rest: Array) -> tuple[Array, Array, Array]:

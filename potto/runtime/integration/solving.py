@@ -50,7 +50,7 @@ from potto.runtime.integration.methods.choices import (
 from potto.runtime.integration.methods.directions import by_directions
 from potto.runtime.integration.methods.elimination import ACCURATE, WORTH, eliminated, step_by_step
 from potto.runtime.integration.methods.members import by_members
-from potto.runtime.integration.methods.second_looks import beside_another, by_less, in_another_order
+from potto.runtime.integration.methods.second_looks import beside_another, by_less, by_more, in_another_order
 from potto.runtime.integration.problem import Problem
 
 # How many times what a trial took the most promising order gets before variables are eliminated, or it gets all that
@@ -278,6 +278,6 @@ def improved(problem: Problem, order: Integral, sums: Sums, improvers: Sequence[
     return sums
 
 
-ALONE = (by_less, beside_another, on_both_sides, at_folds, in_another_order, by_differences)
+ALONE = (by_less, by_more, beside_another, on_both_sides, at_folds, in_another_order, by_differences)
 TOGETHER = (beside_another, on_both_sides, at_folds, in_another_order)
 INSIDE = (beside_another,)

@@ -1,6 +1,6 @@
-"""Integrals looked at a second time: with less asked for, with other nodes, with another variable innermost.
+"""Integrals looked at a second time: with less or more asked for, with other nodes, with another variable innermost.
 
-Owns the improvers `by_less`, `beside_another` and `in_another_order`.
+Owns the improvers `by_less`, `by_more`, `beside_another` and `in_another_order`.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from potto.core.terms import Integral
 from potto.integrate.events import Degenerate, Fold, Shortfall, TwoSided, Unsearched
 from potto.integrate.pieces import Sums
 from potto.kernels.cells import Array
-from potto.runtime.answers.convergence import missing
+from potto.runtime.answers.convergence import ONLY_ROUNDED, missing
 from potto.runtime.integration.methods.attempts import attempted, uncertainty
 from potto.runtime.integration.methods.choices import orders
 from potto.runtime.integration.methods.quadrature import in_parts, iterated
@@ -23,7 +23,8 @@ from potto.runtime.integration.problem import Problem
 
 ENOUGH = 1e-3  # a relative error from which on it is tried with less
 TOLERANCES = (1e-6, 1e-3)  # that are asked for instead, one after the other, until one is reached
-EXTRA = 0.125  # the part of the budget that each may take beyond it
+EXTRA = 0.125  # the part of the budget that each may take beyond it, and that is little
+MORE = 1 / 32  # the part that is asked for where errors further in are all that is missing
 LOOK = 12_000  # evaluations that may go into another order
 OTHER_NODES = 14  # in other places than those of the first time
 # From how many errors of the value on an error of a derivative is looked at again from another side, and for how many
@@ -56,6 +57,36 @@ def by_less(problem: Problem, order: Integral, sums: Sums) -> Sums:
         if uncertainty(sums) <= rtol:
             break
     return sums
+
+
+def by_more(problem: Problem, order: Integral, sums: Sums) -> Sums:
+    """The sums, or what is known better by asking for more, where they ended a little above what was asked for.
+
+    What integrals further in may be off by is measured by the largest of them. Derivatives that cancel further out, or
+    many nodes whose bounds add up, leave more than was asked for, though evaluations are left; where rounding is what
+    limits them the bounds stay what they are. Not where that would take long: it may take twice as many evaluations.
+    """
+    machine, plan = problem.machine, problem.plan(order)
+    if len(plan.levels) < 2 or plan.confused or (machine.directions and not plan.reaches):
+        return sums
+    if machine.record.spent > EXTRA * machine.settings.max_evals or uncertainty(sums) > ONLY_ROUNDED:
+        return sums
+    if machine.inexact(plan.term.body) or problem.events.every(Shortfall):
+        return sums
+    if not missing(problem.term, sums, machine.settings, problem.env).any():
+        return sums
+    strict = machine.changed(settings=replace(machine.settings, rtol=MORE * machine.rtol))
+    found = attempted(problem.changed(machine=strict), order, 2 * machine.record.spent)
+    if found.stopped or found.events.touched(problem.batch, TwoSided, Fold, Degenerate).any():
+        return sums
+    other, value, rate = found.sums, found.sums.e < sums.e, found.sums.et < sums.et
+    return replace(
+        sums,
+        v=np.where(value, other.v, sums.v),
+        e=np.where(value, other.e, sums.e),
+        t=np.where(rate, other.t, sums.t),
+        et=np.where(rate, other.et, sums.et),
+    )
 
 
 def beside_another(problem: Problem, order: Integral, sums: Sums) -> Sums:
