@@ -76,7 +76,7 @@ def by_more(problem: Problem, order: Integral, sums: Sums) -> Sums:
     if not missing(problem.term, sums, machine.settings, problem.env).any():
         return sums
     strict = machine.changed(settings=replace(machine.settings, rtol=MORE * machine.rtol))
-    found = attempted(problem.changed(machine=strict), order, 2 * machine.record.spent)
+    found = attempted(problem.changed(machine=strict), order, math.ceil(2 * machine.record.spent))
     if found.stopped or found.events.touched(problem.batch, TwoSided, Fold, Degenerate).any():
         return sums
     other, value, rate = found.sums, found.sums.e < sums.e, found.sums.et < sums.et
