@@ -290,7 +290,7 @@ def test_deriv_of_a_definition_around_integrals_of_others(potto: Potto) -> None:
 
 
 def test_a_derivative_that_nobody_would_read_is_left_to_json(potto: Potto) -> None:
-    text = "def touch(a, d, w) integral [0, pi/w] [a*sin(w*t) > d] d(t)"
+    text = "def touch(a, d, w) integral [0, pi/w] [a*sin(w*t) > d]*exp(t*d)*(t - w) d(t)"
     ran = potto("deriv", "t.po", "touch", t=text)
     told = next(line for line in ran.out.splitlines() if line.startswith("  whole"))
     whole = potto("deriv", "t.po", "touch", "--json").json["derivative"]
