@@ -14,7 +14,7 @@ import pytest
 from calculus_terms import term, value
 
 from potto.calculus.solving.solve import Sections, Unsolvable, sections
-from potto.core.terms import Term, const, postorder, substitute
+from potto.core.terms import Term, const, postorder, substitute, var
 
 # A surface in x, and what its parameters range over (the default is [-2, 2]).
 SURFACES = [
@@ -129,6 +129,15 @@ def test_roots_are_roots(text: str, seed: int) -> None:
             here = value(surface, {**env, "x": root})
             slope = 1 + abs(root) + sum(abs(v) for v in env.values())
             assert abs(here) < mpmath.mpf(10) ** -30 * slope**4, (root, here)
+
+
+def test_two_edges_of_a_polygon_meet_in_their_corner() -> None:
+    """Where they meet is a fraction of fractions of the coordinates, and as such loses digits of a flat corner."""
+    other = "(ay - by)*(x - bx)/(ax - bx) + by"  # the height of the edge from a to b
+    surface = term(f"(cx - bx)*({other} - by) - (cy - by)*(x - bx)")
+    assert solved(surface).roots == (var("bx"),)
+    surface = term("(cx - bx)*(ay - (by - ay)*ax/(bx - ax) + (by - ay)/(bx - ax)*x - by) - (cy - by)*(x - bx)")
+    assert solved(surface).roots == (var("bx"),)
 
 
 @pytest.mark.parametrize(("text", "seed"), cases())

@@ -6,8 +6,10 @@ between the first two runs: moved along x by its foot, the edge sweeps a triangl
 
 from __future__ import annotations
 
+import mpmath as mp
 import numpy as np
 import pytest
+from polygons import Point, area, in_square
 
 import potto
 
@@ -82,7 +84,21 @@ def test_a_corner_of_two_edges_that_lean_along_either_axis() -> None:
     c = (float.fromhex("0x1.9f39efe4e248dp-2"), float.fromhex("0x1.489318f6bdce9p-1"))
     found = potto.grad(potto.compile(LEANING).area, ["b"])(a, b, c)
     (across, down), (off_across, off_down) = found.tangent, found.tangent_error
-    below = 305 / 512 - b[1]  # how far the pixel reaches below the corner; left of it, the triangle
-    assert abs(across - below * (1 - 0.5 * below / (c[1] - b[1]))) <= off_across < 1e-4 * across
-    left, whole = b[0] - 207 / 512, b[0] - a[0]
-    assert abs(down + left * (1 - 0.5 * left / whole)) <= off_down < -1e-3 * down
+    exact = _slopes_of_area(a, b, c)
+    assert abs(across - exact[0]) <= off_across < 1e-4 * across
+    assert abs(down - exact[1]) <= off_down < -1e-3 * down
+
+
+def _slopes_of_area(*corners: Point) -> list[float]:
+    """How the area that a pixel sees of a triangle moves with the second corner: differences at 80 digits."""
+    with mp.workdps(80):
+        step, slopes = mp.mpf(10) ** -40, []
+        for axis in (0, 1):
+            seen = []
+            for sign in (1, -1):
+                moved = [[mp.mpf(x) for x in corner] for corner in corners]
+                moved[1][axis] += sign * step
+                polygon = [tuple(corner) for corner in moved]
+                seen.append(area(in_square(polygon, mp.mpf(207) / 512, mp.mpf(304) / 512, mp.mpf(1) / 512)))
+            slopes.append(float((seen[0] - seen[1]) / (2 * step)))
+        return slopes

@@ -263,9 +263,9 @@ def _plus(a: Rational, b: Rational) -> Rational:
 
 def _product(a: Rational, b: Rational) -> Rational:
     if a.top == b.below:
-        return Rational(b.top, a.below) if a.top else a
+        return _reduced(b.top, a.below) if a.top else a
     if a.below == b.top:
-        return Rational(a.top, b.below)
+        return _reduced(a.top, b.below)
     return _reduced(_times(a.top, b.top), _times(a.below, b.below))
 
 

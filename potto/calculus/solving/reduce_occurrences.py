@@ -148,7 +148,8 @@ def _polynomial(degrees: Degrees, atom: Term, plain: bool) -> tuple[IsolationSte
     inner = atom if unit == 1 else (prim("sqrt", atom) if unit == Fraction(1, 2) else pow_(atom, const(float(unit))))
     highest = max(coefficients)
     if highest == 1:
-        roots: tuple[Term, ...] = (quotient(minus(coefficients[0]), coefficients[1]),)
+        root = quotient(minus(coefficients[0]), coefficients[1])  # of two edges of a polygon, their corner
+        roots: tuple[Term, ...] = (root if isinstance(coefficients[1], Const) else shorter(root),)
     elif plain:
         roots = quadratic_formula(coefficients[2], coefficients[1], coefficients[0])
     else:
