@@ -68,7 +68,7 @@ def test_cells_are_the_same(program: str, monkeypatch: pytest.MonkeyPatch) -> No
 
 def _lit(plan: StraightIntegral, found: Found) -> list[tuple[int, ...]]:
     """The cells in which something is to be integrated, in order."""
-    columns = (found.members, *found.rows.reshape(2 * len(found.rows), found.members.size), found.sides)
+    columns = (found.members, found.between, found.sides)
     cells = sorted(zip(*(column.tolist() for column in columns), strict=True))
     count = len(children(plan.surfaces.body))
     return [cell for cell in cells if not nothing(plan.face(tuple(bool(cell[-1] >> bit & 1) for bit in range(count))))]

@@ -41,9 +41,9 @@ def test_totals_are_the_same(program: str, count: int, monkeypatch: pytest.Monke
         good = added(rule, env, index, total)
         if good is None:
             return None
-        owners, rows = rule.cell.members.take(index), rule.cell.rows.take(index, -1)
+        owners, between = rule.cell.members.take(index), rule.cell.between.take(index)
         axes = [axis(order, MEAN, STRAIGHT, rule._several(index)) for order in rule.orders]
-        raw = at_once(rule.plan, rule.cell.face, rule.machine, env, owners, rows, axes)
+        raw = at_once(rule.plan, rule.cell.face, rule.machine, env, owners, between, axes)
         found = rule._measured(raw, index, rule.orders)
         fine = rule.good(found, before[0].take(owners, 1) if index.size <= FEW else None)
         spoilt += (~fine).sum()

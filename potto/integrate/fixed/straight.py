@@ -7,7 +7,8 @@ and told by coefficients in `alike` for many.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import itertools
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
 from typing import Any
 
@@ -37,6 +38,7 @@ from potto.core.terms import (
 from potto.integrate.fixed.steps.step_integral import StepIntegral, step_integral
 from potto.integrate.levels import LevelPlan
 from potto.integrate.rules.complex_enclosures import enclosable
+from potto.kernels.cells import Ints
 
 MOST_VARIABLES, MOST_CUTS, MOST_TERMS = 3, 13, 600
 # Up to how many cuts cells are looked at one by one (`proved_sums`): with four a call at the same numbers takes 85 us
@@ -184,6 +186,34 @@ def _with_choices(plan: StraightIntegral, held: tuple[tuple[Term, bool], ...]) -
     free = plan.body.free.union(*(frame.body.free for frame in frames)) - set(plan.variables)
     names = tuple(sorted(free))
     return StraightIntegral(plan.variables, frames, jumps, turning, shared, plan.body, plan.surfaces, names, held=held)
+
+
+def rows_between(between: Ints, variables: int) -> RowNumbers:
+    """The rows of the frames between which cells lie, (variables, 2, N), by numbers with a digit of ROW_BITS for each,
+    the first one in front."""
+    rows = np.empty((2 * variables, between.size), dtype=np.uint8)
+    for n, row in enumerate(rows):
+        row[:] = between >> row_shift(n, variables) & (1 << ROW_BITS) - 1
+    return rows.reshape(variables, 2, -1)
+
+
+def between_rows(rows: Iterable[tuple[int, int]]) -> int:
+    """The number that tells these rows, the lower and the upper end of each variable."""
+    number = 0
+    for row in itertools.chain.from_iterable(rows):
+        number = number << ROW_BITS | row
+    return number
+
+
+def in_rows(between: Ints, variables: int) -> Ints:
+    """Places of such numbers in their order, so that cells between the same rows are neighbours."""
+    few = 2 * variables * ROW_BITS <= np.iinfo(np.uint16).bits  # these are sorted in one pass
+    return np.argsort(between.astype(np.uint16) if few else between, kind="stable")
+
+
+def row_shift(place: int, variables: int) -> int:
+    """How many bits come behind the digit of such a number at this place, counted from the first one."""
+    return ROW_BITS * (2 * variables - 1 - place)
 
 
 def nothing(face: Term) -> bool:

@@ -141,6 +141,34 @@ class Vectors:
         """Whole numbers, read as such."""
         return self.let(f"load {self.whole_numbers}, ptr {place}, align 8")
 
+    def digit(self, numbers: str, shift: int, bits: int) -> str:
+        """So many bits of whole numbers, those from a place on."""
+        shifted = self.once(f"lshr {self.whole_numbers} {numbers}, splat (i64 {shift})", numbers)
+        return self.once(f"and {self.whole_numbers} {shifted}, splat (i64 {(1 << bits) - 1})", shifted)
+
+    def same(self, numbers: str, number: int) -> str:
+        """A mask of the whole numbers that are this one."""
+        return self.once(f"icmp eq {self.whole_numbers} {numbers}, splat (i64 {number})", numbers)
+
+    def those(self, numbers: str, mask: str) -> str:
+        """The whole numbers of a mask in front, in order."""
+        kind = self.whole_numbers
+        return self.once(f"call {kind} {self.compress}({kind} {numbers}, {self.masks} {mask}, {kind} poison)",
+                         numbers, mask)  # fmt: skip
+
+    @property
+    def compress(self) -> str:
+        return f"@llvm.experimental.vector.compress.v{self.lanes}i64"
+
+    def many(self, mask: str) -> str:
+        """For how many a mask holds."""
+        bits = f"i{self.lanes}"
+        one = self.once(f"bitcast {self.masks} {mask} to {bits}", mask)
+        return self.once(f"zext {bits} {self.once(f'call {bits} @llvm.ctpop.{bits}({bits} {one})', one)} to i64", one)
+
+    def store_wholes(self, value: str, place: str) -> None:
+        self.line(f"store {self.whole_numbers} {value}, ptr {place}, align 8")
+
     def gather(self, memory: str, index: str) -> str:
         """Numbers from these places of memory."""
         return self.let(f"call {self.doubles} @gather(ptr {memory}, {self.whole_numbers} {index})")
@@ -219,7 +247,11 @@ def intrinsics(text: str, at: Vectors) -> str:
         name = f"@llvm.{_NAMES.get(code, code)}.v{at.lanes}f64"
         if name + "(" in text:
             wanted.append(f"declare {at.doubles} {name}({', '.join([at.doubles] * arity)})")
-    others = {"@llvm.umin.i64": ("i64", "i64, i64"), f"@llvm.vector.reduce.or.v{at.lanes}i1": ("i1", at.masks)}
+    others = {
+        "@llvm.umin.i64": ("i64", "i64, i64"), f"@llvm.vector.reduce.or.v{at.lanes}i1": ("i1", at.masks),
+        f"@llvm.ctpop.i{at.lanes}": (f"i{at.lanes}", f"i{at.lanes}"),
+        at.compress: (at.whole_numbers, f"{at.whole_numbers}, {at.masks}, {at.whole_numbers}"),
+    }  # fmt: skip
     for name, (result, parameters) in others.items():
         if name + "(" in text:
             wanted.append(f"declare {result} {name}({parameters})")

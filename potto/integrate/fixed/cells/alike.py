@@ -20,7 +20,7 @@ from potto.integrate.fixed.cells.proved_shapes import proved_rules
 from potto.integrate.fixed.cells.topologies import Alike, topologies
 from potto.integrate.fixed.moving_sums import evaluated
 from potto.integrate.fixed.steps.step_batches import by_cells
-from potto.integrate.fixed.straight import StraightIntegral
+from potto.integrate.fixed.straight import StraightIntegral, in_rows
 from potto.integrate.pieces import Evaluator, Shaped, Sums, added_up, gather, together
 from potto.kernels.cells import Array, Bools, Cell, Ints, Value
 
@@ -163,7 +163,7 @@ def _applied(rule: ProductRule, env: dict[str, Value], todo: Ints, total: Array,
         return todo[~good]
     step, left = max(1, POINTS // rule.span(env)), []
     if not rule.native(env):
-        todo = todo[np.argsort(rule.cell.between.take(todo), kind="stable")]
+        todo = todo[in_rows(rule.cell.between.take(todo), len(rule.orders))]
     for start in range(0, todo.size, step):
         index = todo[start : start + step]
         found, owners = rule.applied(env, index), rule.cell.members.take(index)

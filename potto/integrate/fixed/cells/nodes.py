@@ -16,7 +16,7 @@ from potto.core.terms import Term, function_of, tuple_
 from potto.integrate.fixed.axes import ENDS, Axis, Raw
 from potto.integrate.fixed.edges import EDGE, edges_of
 from potto.integrate.fixed.moving_sums import evaluated, product
-from potto.integrate.fixed.straight import RowNumbers, StraightIntegral
+from potto.integrate.fixed.straight import RowNumbers, StraightIntegral, rows_between
 from potto.integrate.pieces import Evaluator, dense, still
 from potto.integrate.rules.gauss import EPS
 from potto.kernels.cells import Array, Bools, Cell, Ints, Value, map_arrays
@@ -43,12 +43,12 @@ class Nodes(Struct, frozen=True):
 
 
 def at_once(
-    plan: StraightIntegral, face: Term, machine: Evaluator, env: Mapping[str, Value], members: Ints, rows: RowNumbers,
+    plan: StraightIntegral, face: Term, machine: Evaluator, env: Mapping[str, Value], members: Ints, between: Ints,
     axes: Sequence[Axis],
 ) -> Raw:  # fmt: skip
-    """The sums over cells. members: (M,), whose they are; rows: (variables, 2, M), of the frames, between which."""
+    """The sums over cells. members: (M,), whose they are; between: (M,), which rows they lie, as numbers."""
     here = {n: map_arrays(v, lambda a: a.take(members) if a.ndim else a) for n, v in env.items()}
-    cells = _Cells(plan, face, here, rows, axes)
+    cells = _Cells(plan, face, here, rows_between(between, len(axes)), axes)
     tracking = machine.tracking()
     few = [axis.few for axis in axes]
     some = cells.at_nodes(tracking, [*few[:-1], few[-1][:-ENDS]], True)

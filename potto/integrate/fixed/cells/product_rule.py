@@ -100,9 +100,9 @@ class ProductRule(Struct, frozen=True):
         several = self._several(index)
         axes = [axis(order, MEAN, STRAIGHT, several) for order in self.orders]
         wanted = Wanted(*self._parts, index.size <= FEW, ELSEWHERE if several else 1.0)
-        members, rows = self.cell.members.take(index), self.cell.rows.take(index, -1)
+        members, between = self.cell.members.take(index), self.cell.between.take(index)
         beyond = None if self.beyond is None else self.beyond.take(index, 1)
-        return way.add(function, env, members, rows, axes, wanted, beyond, total)
+        return way.add(function, env, members, between, axes, wanted, beyond, total)
 
     def foreseen(self, env: dict[str, Value], index: Ints, others: Sequence[ProductRule]) -> Iterator[Bools]:
         """For which cells rules with no more nodes than this one would do, by its coefficients."""
@@ -115,12 +115,12 @@ class ProductRule(Struct, frozen=True):
         turning = [STRAIGHT if exact else ends for exact, ends in zip(self.exact, self.cell.turning, strict=True)]
         given, several = zip(self.orders, asked, turning, strict=True), self._several(index)
         axes = [axis(order, own, ends, several) for order, own, ends in given]
-        way, members, rows = self.lowered(env), self.cell.members.take(index), self.cell.rows.take(index, -1)
+        way, members, between = self.lowered(env), self.cell.members.take(index), self.cell.between.take(index)
         function = None if all(self.exact) else way.function(self.machine)
         if function is not None:
-            return way.run(function, env, members, rows, axes, self.machine.directions)
+            return way.run(function, env, members, between, axes, self.machine.directions)
         with way.promotion.by_numpy():
-            return at_once(self.plan, self.cell.face, self.machine, env, members, rows, axes)
+            return at_once(self.plan, self.cell.face, self.machine, env, members, between, axes)
 
     def _several(self, index: Ints) -> bool:
         """Whether there are so many nodes that rounding is followed at few of them."""

@@ -18,7 +18,7 @@ from potto.integrate.columns import distinct, places_of
 from potto.integrate.fixed.cells.product_rule import ProductRule
 from potto.integrate.fixed.cells.topologies import Alike
 from potto.integrate.fixed.regions import LOOSEST, MARGIN, MOST_REGIONS
-from potto.integrate.fixed.straight import StraightIntegral
+from potto.integrate.fixed.straight import RowNumbers, StraightIntegral, rows_between
 from potto.integrate.pieces import Evaluator
 from potto.integrate.rules.proved_orders import FrameCell as Stretch
 from potto.integrate.rules.proved_orders import proved_of_each
@@ -65,9 +65,8 @@ def proved_rules(
     if count < FEW or any(map(any, cell.turning)):
         return [], everybody
     shapes = distinct(cell.between)
-    shape, first = places_of(shapes, cell.between), np.empty(shapes.size, dtype=np.int64)
-    first[shape] = everybody  # any of them
-    stretches = [_stretch(cell, number) for number in first.tolist()]
+    shape, rows = places_of(shapes, cell.between), rows_between(shapes, len(cell.turning))
+    stretches = [_stretch(cell, rows[:, :, number]) for number in range(shapes.size)]
     values = {name: _of(env[name].v, cell.members) for name in _names(plan, stretches)}  # type: ignore[union-attr]
     grid = _grid(values, count)
     if grid is None:
@@ -107,10 +106,9 @@ def _proofs(
     return nodes, error
 
 
-def _stretch(cell: Alike, number: int) -> Stretch:
-    """What one of the cells is to a proof."""
-    rows = cell.rows[:, :, number].tolist()
-    return Stretch(tuple((low, high) for low, high in rows), cell.face)
+def _stretch(cell: Alike, rows: RowNumbers) -> Stretch:
+    """What cells between these rows are to a proof."""
+    return Stretch(tuple((low, high) for low, high in rows.tolist()), cell.face)
 
 
 def _names(plan: StraightIntegral, stretches: Sequence[Stretch]) -> list[str]:

@@ -10,7 +10,6 @@ in the middle of a cell, is not plain, and is left to the general way.
 from __future__ import annotations
 
 from collections.abc import Collection
-from functools import cached_property
 
 import numpy as np
 from msgspec import Struct
@@ -20,7 +19,7 @@ from potto.integrate.columns import distinct
 from potto.integrate.fixed.lowered.topologies import Found, lowered_topologies
 from potto.integrate.fixed.lowered.topology_text import FARTHEST
 from potto.integrate.fixed.moving_sums import evaluated
-from potto.integrate.fixed.straight import CLEAR, ROW_BITS, RowNumbers, StraightIntegral, nothing
+from potto.integrate.fixed.straight import CLEAR, ROW_BITS, StraightIntegral, nothing, rows_between
 from potto.integrate.pieces import Evaluator, gather
 from potto.kernels.cells import Array, Bools, Cell, Ints, Number, Value
 
@@ -29,40 +28,31 @@ FEW = 16  # numbers, up to which comparing with each of them takes less time tha
 Turning = tuple[tuple[bool, bool], ...]
 
 
-class Alike(Struct, frozen=True, dict=True):
+class Alike(Struct, frozen=True):
     """Cells of one integrand.
 
-    turning: per variable whether the ends of their stretches are like square roots. rows: (variables, 2, N), the rows
-    of the frames between which they lie. members: (N,), whose they are; a member may have several.
+    turning: per variable whether the ends of their stretches are like square roots. between: (N,), the rows of the
+    frames between which they lie, as numbers (`rows_between`). members: (N,), whose they are; a member may have
+    several.
     """
 
     face: Term
     turning: Turning
-    rows: RowNumbers
+    between: Ints
     members: Ints
-
-    @cached_property
-    def between(self) -> RowNumbers:
-        """A number for the rows between which a cell lies, (N,). In its order neighbours lie between the same cuts,
-        which numpy then takes whole."""
-        digits = self.rows.reshape(-1, self.members.size)
-        number = np.zeros(self.members.size, dtype=np.int64)
-        for row in digits:
-            number = (number << ROW_BITS) | row
-        return number.astype(np.uint16) if len(digits) * ROW_BITS <= 16 else number  # sorts in one pass
 
 
 class _Cells(Struct):
     """Stretches of the variables so far, (N,) each: their rows, whose they are, and numbers, variables at middles."""
 
-    rows: RowNumbers
+    between: Ints
     members: Ints
     env: dict[str, Value]
 
     def pick(self, index: Ints, names: Collection[str]) -> _Cells:
         """Some of the cells, with those numbers that are still asked for."""
         env = {name: value for name, value in self.env.items() if name in names}
-        return _Cells(self.rows.take(index, -1), self.members.take(index), gather(env, index))
+        return _Cells(self.between.take(index), self.members.take(index), gather(env, index))
 
 
 def topologies(
@@ -103,12 +93,12 @@ def _found(
     merging: cuts of the outermost variable that are one and move as one count once.
     """
     plain = np.ones(batch, dtype=bool)
-    cells = _Cells(np.empty((0, 2, batch), dtype=np.int64), np.arange(batch), here)
+    cells = _Cells(np.zeros(batch, dtype=np.int64), np.arange(batch), here)
     for i in range(len(plan.variables)):
         cells = _along(plan, i, machine, cells, plain, merging and not i)
     sides = _sides(plan, machine, cells, plain)
     kept = np.flatnonzero(plain.take(cells.members))
-    return Found(plain, cells.rows.take(kept, -1), cells.members.take(kept), sides.take(kept))
+    return Found(plain, cells.between.take(kept), cells.members.take(kept), sides.take(kept))
 
 
 def _along(
@@ -133,7 +123,7 @@ def _along(
                  for rows in (order[:-1], order[1:]))  # fmt: skip
     later = (*plan.frames[i + 1 :], plan.surfaces)
     inner = cells.pick(index, {name for function in later for name in function.params})
-    inner.rows = np.concatenate((inner.rows, np.stack((low, high))[None]))
+    inner.between = (inner.between << ROW_BITS | low) << ROW_BITS | high
     inner.env[plan.variables[i]] = Cell(0.5 * (flat.take(low * size + index) + flat.take(high * size + index)))
     return inner
 
@@ -155,9 +145,10 @@ def _gathered(plan: StraightIntegral, machine: Evaluator, cells: Found) -> list[
     one), and by which ends of their stretches are like square roots."""
     count, found, sides = len(plan.variables), [], cells.sides
     turns = np.zeros(cells.members.size, dtype=np.int64)
+    rows = rows_between(cells.between if any(plan.turning) else cells.between[:0], count)
     for i, turning in enumerate(plan.turning):
         if turning:
-            ends = np.isin(cells.rows[i], list(turning))
+            ends = np.isin(rows[i], list(turning))
             turns |= (ends[0].astype(np.int64) << 2 * i) | (ends[1].astype(np.int64) << 2 * i + 1)
     codes: dict[Term, list[int]] = {}
     for code in distinct(sides).tolist():
@@ -171,7 +162,7 @@ def _gathered(plan: StraightIntegral, machine: Evaluator, cells: Found) -> list[
         for turn in () if dark else distinct(turns[own]):
             index = np.nonzero(own & (turns == turn))[0]
             turning_ends = tuple((bool(turn >> 2 * i & 1), bool(turn >> 2 * i + 1 & 1)) for i in range(count))
-            found.append(Alike(face, turning_ends, cells.rows.take(index, -1), cells.members.take(index)))
+            found.append(Alike(face, turning_ends, cells.between.take(index), cells.members.take(index)))
     return found
 
 

@@ -22,7 +22,7 @@ from potto.core.terms import Term, postorder
 from potto.integrate.fixed.axes import Axis, Raw
 from potto.integrate.fixed.lowered.formula_text import ONE, ParameterPlace
 from potto.integrate.fixed.lowered.rule_text import NAME, RuleText
-from potto.integrate.fixed.straight import RowNumbers, StraightIntegral
+from potto.integrate.fixed.straight import StraightIntegral
 from potto.integrate.pieces import Evaluator
 from potto.kernels.cells import Array, Bools, Cell, Ints, Value
 from potto.kernels.making import counts
@@ -71,16 +71,16 @@ class LoweredCells(Struct, frozen=True):
         )
 
     def run(
-        self, function: Loaded, env: Mapping[str, Value], members: Ints, rows: RowNumbers, axes: Sequence[Axis],
+        self, function: Loaded, env: Mapping[str, Value], members: Ints, between: Ints, axes: Sequence[Axis],
         directions: int,
     ) -> Raw:  # fmt: skip
-        """The sums over cells. members: (M,), whose they are; rows: (variables, 2, M), of the frames, between which."""
+        """The sums over cells. members: (M,), whose they are; between: (M,), which rows they lie, as numbers."""
         k1, count = 1 + directions, members.size
         numbers, arrays = given(self.places, env)
         sizes = [3 * k1 + self.kind.beside, *(axis.transform.shape[1] * k1 for axis in axes)]
         out = np.empty((sum(sizes), max(count, self.lanes)))
-        owners, *ends = [whole(column, out.shape[1]) for column in (members, *ends_of(rows))]
-        frame = frame_of(out, axes, [owners, *arrays, *ends])
+        told = [whole(column, out.shape[1]) for column in (members, between)]
+        frame = frame_of(out, axes, [*told, *arrays])
         function.call(address(frame), address(numbers))
         counts.native_points += count * math.prod(len(axis.nodes) for axis in axes)
         found = out[:, :count]
@@ -91,7 +91,7 @@ class LoweredCells(Struct, frozen=True):
         return Raw(number, coefficients, most, off, clear, corners, largest)
 
     def add(
-        self, function: Loaded, env: Mapping[str, Value], members: Ints, rows: RowNumbers, axes: Sequence[Axis],
+        self, function: Loaded, env: Mapping[str, Value], members: Ints, between: Ints, axes: Sequence[Axis],
         wanted: Wanted, beyond: Array | None, total: Array,
     ) -> Bools:  # fmt: skip
         """Add the sums over those cells that are good enough to those of their members; which these are (M,).
@@ -103,22 +103,16 @@ class LoweredCells(Struct, frozen=True):
         constants = np.concatenate(((wanted.part, wanted.added, wanted.beside), numbers))
         least = max(members.size, self.lanes)
         good, proved = np.empty((1, least)), beyond is not None
-        owners, *ends = [whole(column, least) for column in (members, *ends_of(rows))]
+        cells = [whole(column, least) for column in (members, between)]
         left = [whole(row, least) for row in beyond] if beyond is not None else []
         for start, stop in parts(least, AT_ONCE):
-            some = [column[start:stop] for column in (owners, *ends, *left)]
             told = total.strides[1] // total.itemsize, int(wanted.whole), int(proved), min(stop, members.size) - start
-            frame = frame_of(good[:, start:stop], axes, [*some[:1], *arrays, *some[1 : 1 + len(ends)]])
-            where = [address(column) for column in some[1 + len(ends) :]] or [0] * total.shape[1]
+            frame = frame_of(good[:, start:stop], axes, [*(column[start:stop] for column in cells), *arrays])
+            where = [address(row[start:stop]) for row in left] or [0] * total.shape[1]
             frame = np.array([*frame, address(total), *told, *where], dtype=np.int64)
             function.call(address(frame), address(constants))
         counts.native_points += members.size * math.prod(len(axis.nodes) for axis in axes)
         return np.asarray(good[0, : members.size] > 0)
-
-
-def ends_of(rows: RowNumbers) -> list[NDArray[Any]]:
-    """The rows between which cells lie as columns of numbers."""
-    return [row.astype(float) for pair in rows for row in pair]
 
 
 def lowered_cells(

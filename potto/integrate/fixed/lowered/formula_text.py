@@ -60,6 +60,7 @@ class FormulaText:
         self.machine, self.at = machine, Vectors(lanes)
         self.k1 = 1 + machine.directions
         self.zero, self.one = self.at.number(0.0), self.at.number(1.0)
+        self.kernels: dict[str, FlatKernel] = {}
 
     # Members
 
@@ -113,14 +114,20 @@ class FormulaText:
 
     def evaluated(self, function: Lam, env: Env, machine: Evaluator) -> list[Symbol]:
         """The numbers of a function to a number or a tuple of them."""
-        args = [env[name] for name in function.params]
-        kernel = machine.kernel(function, tuple(arg.pattern() for arg in args))
-        if not kernel.plain:
-            raise NotStraight(kernel.text)
-        flat = FlatKernel.of(kernel)
+        args, flat = [env[name] for name in function.params], self.kernel(function, env, machine)
         known = {name: self.plain(args[part.path[0]].part(part)) or self.zero for name, part in flat.parts.items()}
         found = self.at.run(flat.operations, known)
         return [self.symbol(cell, found) for cell in packed(flat.result)]
+
+    def kernel(self, function: Lam, env: Env, machine: Evaluator) -> FlatKernel:
+        """The operations that lead to these numbers."""
+        kernel = machine.kernel(function, tuple(env[name].pattern() for name in function.params))
+        if not kernel.plain:
+            raise NotStraight(kernel.text)
+        found = self.kernels.get(kernel.text)
+        if found is None:
+            found = self.kernels[kernel.text] = FlatKernel.of(kernel)
+        return found
 
     def symbol(self, cell: Packed, found: Mapping[str, str]) -> Symbol:
         def part(name: str | None) -> str | None:

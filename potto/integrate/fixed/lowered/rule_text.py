@@ -15,8 +15,9 @@ import numpy as np
 from potto.core.terms import Term, function_of
 from potto.integrate.fixed.axes import ENDS
 from potto.integrate.fixed.edges import EDGE, edges_of
-from potto.integrate.fixed.lowered.formula_text import Dual, Env, FormulaText, ParameterPlace, Symbol, still
-from potto.integrate.fixed.straight import StraightIntegral
+from potto.integrate.fixed.lowered.formula_text import Dual, Env, ParameterPlace, Symbol, still
+from potto.integrate.fixed.lowered.row_text import RowText
+from potto.integrate.fixed.straight import ROW_BITS, StraightIntegral, row_shift
 from potto.integrate.pieces import Evaluator
 from potto.integrate.rules.gauss import EPS
 from potto.kernels.native.elementary import module
@@ -26,13 +27,14 @@ NAME = "rule"
 # Numbers of the frame: how many members, how long the rows of results are, and where, how many ends of each stretch are
 # looked at; for each variable how many nodes, coefficients and nodes with rounding, then where tables are.
 HEAD, PER_AXIS = 4, 9
+CELL = 2  # columns that tell of a cell: whose it is, and between which rows it lies
 
 
-class RuleText(FormulaText):
+class RuleText(RowText):
     """Writes the function. Lists of 1 + k names have a value first, then its tangents.
 
-    Behind the tables the frame tells whose cells they are, then where the columns are: those of parameters, a number
-    for every member, and the rows of the ends of cells.
+    Behind the tables the frame tells where the columns are: whose cells they are, between which rows they lie (a whole
+    number each, as of `rows_between`), and those of parameters, a number for every member.
 
     Rows of results: the integrals with their tangents, the most that is added up for each and what rounding puts it
     off, then so many `beside`: whether a cell is clear, the largest value at corners, and at nodes; then coefficients.
@@ -41,8 +43,7 @@ class RuleText(FormulaText):
     beside = 3
 
     def __init__(self, plan: StraightIntegral, face: Term, machine: Evaluator, lanes: int = LANES) -> None:
-        super().__init__(machine, lanes)
-        self.plan = plan
+        super().__init__(plan, machine, lanes)
         self.face, self.edges = function_of(face), [function_of(edge) for edge in edges_of(face)]
         self.channels = self.k1
 
@@ -64,10 +65,13 @@ class RuleText(FormulaText):
 
     def cells(self, places: Sequence[ParameterPlace]) -> Env:
         """The parameters of the cells of a block, which are clear so far; between which rows they lie is noted."""
-        at, start = self.at, self.columns
+        at, start, count = self.at, self.columns, len(self.plan.variables)
         self.clear = at.room(1)
-        self.members = at.wholes(at.at(at.address("%frame", start, "ptr"), self.first, "i64"))
-        here, rows = self.parameters(places, start + 1, 2 * len(self.plan.variables), self.members)
+        self.members, between = (
+            at.wholes(at.at(at.address("%frame", start + column, "ptr"), self.first, "i64")) for column in range(CELL)
+        )
+        here, _ = self.parameters(places, start + CELL, 0, self.members)
+        rows = [at.digit(between, row_shift(place, count), ROW_BITS) for place in range(2 * count)]
         self.rows = list(zip(rows[::2], rows[1::2], strict=True))
         at.store(self.one, self.clear)
         return here
@@ -270,12 +274,15 @@ class RuleText(FormulaText):
     ) -> tuple[Dual, Dual, Dual, list[Dual]]:
         """The lower end, the length, how far rounding puts nodes off, and how far off both ends are; where another cut
         comes between, that is noted."""
-        at = self.at
-        cells = self.evaluated(self.plan.frames[i], env, machine)
-        low, high = (self.chosen(cells, row) for row in self.rows[i])
+        at, checked = self.at, checked and i > 0
+        cells = self.evaluated(self.plan.frames[i], env, machine) if checked else []
+        numbers = range(len(cells))
+        low, high = (
+            [self.chosen(cells, row, numbers) for row in self.rows[i]] if checked else self.asked_for(i, env, machine)
+        )
         lower, upper = [low.v, *low.t], [high.v, *high.t]
         width = [self.total(x, None if y is None else at.apply("neg", y)) for x, y in zip(upper, lower, strict=True)]
-        if i and checked:
+        if checked:
             self.only(at.apply("gt", high.v, low.v))
             for cell in cells:
                 between = at.apply("and", at.apply("gt", cell.v, low.v), at.apply("lt", cell.v, high.v))
@@ -287,25 +294,6 @@ class RuleText(FormulaText):
         for end, row in zip((low, high), rounding, strict=True):
             lost.append([self.total(x, error) for x, error in zip_longest(row, (end.e, *end.et))])
         return lower, width, own, lost
-
-    def chosen(self, cells: Sequence[Symbol], row: str) -> Symbol:
-        """Of the rows of a frame the one with this number."""
-        masks = [self.at.apply("eq", row, self.at.number(float(number))) for number in range(1, len(cells))]
-
-        def part(parts: Sequence[str | None]) -> str | None:
-            if len(set(parts)) == 1:
-                return self.plain(parts[0])
-            found, *others = (self.plain(x) or self.zero for x in parts)
-            for mask, other in zip(masks, others, strict=True):
-                found = self.at.apply("select", mask, other, found)
-            return found
-
-        v = part([cell.v for cell in cells])
-        assert v is not None
-        t, et = (tuple(part(column) for column in zip(*rows, strict=True)) for rows in (
-            [cell.t for cell in cells], [cell.et or (None,) * len(cell.t) for cell in cells]
-        ))  # fmt: skip
-        return Symbol(v, part([cell.e for cell in cells]), t, et)
 
     def node(self, low: Dual, width: Dual, u: str, lost: Dual | None = None) -> Symbol:
         """A node, which moves with the ends of its stretch."""

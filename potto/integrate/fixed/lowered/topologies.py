@@ -14,7 +14,7 @@ from msgspec import Struct, field
 from potto.integrate.fixed.lowered.cells import given, parts, places_of, whole
 from potto.integrate.fixed.lowered.formula_text import ParameterPlace
 from potto.integrate.fixed.lowered.topology_text import FOUND, NAME, TopologyText
-from potto.integrate.fixed.straight import ROW_BITS, RowNumbers, StraightIntegral
+from potto.integrate.fixed.straight import StraightIntegral, in_rows
 from potto.integrate.pieces import Evaluator
 from potto.kernels.cells import Bools, Ints, Value
 from potto.kernels.native.objects import Loaded
@@ -27,12 +27,12 @@ AT_ONCE, ROOM = 1 << 11, 1 << 16
 
 
 class Found(Struct, frozen=True):
-    """Which members are plain (B,), and the cells of these: rows (variables, 2, N) between which they lie, whose they
-    are (N,), and the sides of the surfaces in their middles, as numbers with a bit for each (N,). Where nothing is to
-    be integrated, cells may be left out."""
+    """Which members are plain (B,), and the cells of these: the rows between which they lie, as numbers (N,), whose
+    they are (N,), and the sides of the surfaces in their middles, as numbers with a bit for each (N,). Where nothing is
+    to be integrated, cells may be left out."""
 
     plain: Bools
-    rows: RowNumbers
+    between: Ints
     members: Ints
     sides: Ints
 
@@ -40,11 +40,10 @@ class Found(Struct, frozen=True):
         """The same with what was found of members who were not plain."""
         plain = self.plain.copy()
         plain[members] = others.plain
-        rows = np.concatenate((self.rows, others.rows), axis=-1)
-        owners, sides = (np.concatenate(pair) for pair in (
-            (self.members, members.take(others.members)), (self.sides, others.sides)
+        between, owners, sides = (np.concatenate(pair) for pair in (
+            (self.between, others.between), (self.members, members.take(others.members)), (self.sides, others.sides)
         ))  # fmt: skip
-        return Found(plain, rows, owners, sides)
+        return Found(plain, between, owners, sides)
 
 
 class LoweredTopologies(Struct, frozen=True):
@@ -74,23 +73,15 @@ class LoweredTopologies(Struct, frozen=True):
             into = (plain[start:stop], *room, *(column[start:stop] for column in columns))
             frame = np.array([stop - start, min(stop, batch) - start, 0, *map(address, into)], dtype=np.int64)
             function.call(address(frame), address(constants))
-            cells = room[:, : frame[FOUND]].copy()
+            cells = room[:, : frame[FOUND]]
             cells[0] += start
-            found.append(cells)
+            found.append(cells.take(in_rows(cells[1], len(self.plan.variables)), 1))
         members, between, sides = np.concatenate(found, axis=1)
         fine: Bools = np.asarray(plain[:batch] > 0)
         if not fine.all():
             kept = fine.take(members)
             members, between, sides = members[kept], between[kept], sides[kept]
-        return Found(fine, self.rows(between), members, sides)
-
-    def rows(self, between: Ints) -> RowNumbers:
-        """The rows that such a number tells."""
-        ends = 2 * len(self.plan.variables)
-        rows = np.empty((ends, between.size), dtype=np.uint8)
-        for n, row in enumerate(rows):
-            row[:] = between >> ROW_BITS * (ends - 1 - n) & (1 << ROW_BITS) - 1
-        return rows.reshape(ends // 2, 2, -1)
+        return Found(fine, between, members, sides)
 
 
 def lowered_topologies(plan: StraightIntegral, env: Mapping[str, Value]) -> LoweredTopologies:

@@ -195,13 +195,9 @@ class TopologyText(FormulaText):
             [at.address("%frame", slot, "ptr") for slot in (OWNERS, BETWEEN, SIDES)],
             at.let(f"load i64, ptr {counted}"),
         )
-        for lane in range(LANES):  # what is put down for who has no cell there, the next one takes the place of
-            for place, number in zip(places, numbers, strict=True):
-                one = at.let(f"extractelement {at.whole_numbers} {number}, i32 {lane}")
-                at.line(f"store i64 {one}, ptr {at.at(place, found, 'i64')}")
-            more = at.let(f"extractelement {at.masks} {there}, i32 {lane}")
-            found = at.let(f"add i64 {found}, {at.let(f'zext i1 {more} to i64')}")
-        at.line(f"store i64 {found}, ptr {counted}")
+        for place, number in zip(places, numbers, strict=True):  # the next ones take the place of those not in the mask
+            at.store_wholes(at.those(number, there), at.at(place, found, "i64"))
+        at.line(f"store i64 {at.whole('add', found, at.many(there))}, ptr {counted}")
         at.end()
 
     def surfaces(self, env: Env) -> list[Symbol]:

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 
 from potto.integrate.fixed.lowered.formula_text import ParameterPlace
 from potto.integrate.fixed.lowered.mean_text import MeanText
+from potto.integrate.fixed.lowered.rule_text import CELL
 from potto.integrate.fixed.moving_sums import SUMMED
 
 # Of the constants, the first ones: what is good enough, as parts of the number and of what is added up; and how many
@@ -35,7 +36,7 @@ class TotalText(MeanText):
         at = self.at
         self.begin()
         here = self.cells(places)
-        self.tail = self.columns + 1 + sum(place.kind == "array" for place in places) + 2 * len(self.rows)
+        self.tail = self.columns + CELL + sum(place.kind == "array" for place in places)
         number = [x or self.zero for x in self.mean(0, here)]
         sizes, off = self.rounded(here)
         beside, share = at.constant("%constants", BESIDE), at.number(ELSEWHERE * SUMMED)

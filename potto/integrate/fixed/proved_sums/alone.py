@@ -22,7 +22,7 @@ from potto.integrate.fixed.lowered.cells import LoweredCells, frame_of, lowered_
 from potto.integrate.fixed.lowered.mean_text import MeanText
 from potto.integrate.fixed.lowered.total_text import ELSEWHERE, TRACKED
 from potto.integrate.fixed.moving_sums import SUMMED, MovingTotals, summed
-from potto.integrate.fixed.straight import StraightIntegral
+from potto.integrate.fixed.straight import StraightIntegral, between_rows
 from potto.integrate.pieces import Evaluator
 from potto.integrate.rules.proved_orders import FrameCell as Stretch
 from potto.integrate.rules.proved_orders import Region
@@ -86,15 +86,14 @@ class RegionPart(Struct, frozen=True):
     def layout(self) -> _Layout:
         count = len(self.cells)
         lanes = np.minimum(np.arange(max(count, self.way.lanes)), count - 1)
-        rows = np.array([cell.rows for cell in self.cells], dtype=float)[lanes]  # (lanes, variables, 2)
-        ends = [np.ascontiguousarray(rows[:, i, side]) for i in range(rows.shape[1]) for side in (0, 1)]
+        between = np.array([between_rows(cell.rows) for cell in self.cells])[lanes]
         nobody = np.zeros(lanes.size, dtype=np.int64)  # no parameter differs from cell to cell
         out = np.empty((3 * self.k1 + MeanText.beside, lanes.size))
-        frame = frame_of(out, self.axes, [nobody, *ends])
+        frame = frame_of(out, self.axes, [nobody, between])
         constants = np.empty(len(self.reads))
         where = address(frame), address(constants)
         pack = struct.Struct(f"{len(self.reads)}d").pack_into
-        return _Layout(self.reads, pack, constants, out[:, :count], frame, [nobody, *ends], where)
+        return _Layout(self.reads, pack, constants, out[:, :count], frame, [nobody, between], where)
 
     def summed(self, function: Loaded, env: Mapping[str, Cell]) -> MovingTotals | None:
         """The sums over all nodes of the cells; None where cuts cross."""
