@@ -263,10 +263,15 @@ def _plus(a: Rational, b: Rational) -> Rational:
 
 def _product(a: Rational, b: Rational) -> Rational:
     if a.top == b.below:
-        return _reduced(b.top, a.below) if a.top else a
+        return _left(b.top, a.below) if a.top else a
     if a.below == b.top:
-        return _reduced(a.top, b.below)
+        return _left(a.top, b.below)
     return _reduced(_times(a.top, b.top), _times(a.below, b.below))
+
+
+def _left(top: Polynomial, below: Polynomial) -> Rational:
+    """What is left where a factor has cancelled, which may cancel as well; a number below stays there."""
+    return Rational(top, below) if below.keys() == {()} else _reduced(top, below)
 
 
 def _flip(a: Rational) -> Rational:

@@ -92,6 +92,18 @@ class Vectors:
         self.depths.update(dict.fromkeys(names, self.depth))
         return j, names
 
+    def again(self, value: str) -> str:
+        """A number by another name: what is made of it is made here, and not further out."""
+        return self.let(f"bitcast {self.doubles} {value} to {self.doubles}")
+
+    def end_or(self, before: Sequence[str], found: Sequence[str]) -> list[str]:
+        """End a loop of at most one round: what was found in it, or what was there before it."""
+        stem = self.loops[-1][0]
+        self.end()
+        kind = self.doubles
+        return [self.let(f"phi {kind} [{old}, %before{stem}], [{new}, %last{stem}]")
+                for old, new in zip(before, found, strict=True)]  # fmt: skip
+
     def end(self, *sums: str | None) -> None:
         """End the innermost loop. sums: what those that it adds up are after a round, and so behind it; None for one
         that is not used."""

@@ -19,6 +19,8 @@ from potto.kernels.native.vectors import LANES
 
 # From how many operations on a row is worth a branch, and going through memory: about as many as that takes.
 WORTH = 48
+# Of a cell the value and its rounding, the tangents and theirs.
+Parts = list[str | None]
 
 
 class RowText(FormulaText):
@@ -40,17 +42,29 @@ class RowText(FormulaText):
         long = list(compress(range(len(functions)), apart))
         short = [n for n in range(len(functions)) if n not in long]
         cells = [cell for n in short for cell in self.evaluated(functions[n], env, machine)]
-        known: list[Symbol | Packed] = [*cells]
+        found = [
+            self.parts(self.chosen(cells, row, short) if short else Symbol(self.zero, None, (), ()))
+            for row in self.rows[i]
+        ]
         for n in long:
-            known += packed(self.kernel(functions[n], env, machine).result)
-        there = [any(part is not None for part in parts) for parts in zip(*map(self.parts, known), strict=True)]
-        rooms = [[self.at.room(1) if any_of_it else None for any_of_it in there] for _ in self.rows[i]]
-        for own, row in zip(rooms, self.rows[i], strict=True):
-            self.put(own, self.chosen(cells, row, short) if short else Symbol(self.zero, None, (), ()))
-        noted = self.noted([functions[n] for n in long], env)
-        for n in long:
-            self.worked_out(n, functions[n], rooms, i, env, noted, machine)
-        return [self.taken(own) for own in rooms]
+            found = self.with_row(n, functions[n], i, env, machine, found)
+        return [self.cell(parts) for parts in found]
+
+    def with_row(
+        self, n: int, function: Lam, i: int, env: Env, machine: Evaluator, before: list[Parts]
+    ) -> list[Parts]:  # fmt: skip
+        """What has been found of both ends, or this row where a cell of the block asks for it."""
+        at, masks = self.at, [self.at.same(row, n) for row in self.rows[i]]
+        there = [part is not None for part in self.parts(*packed(self.kernel(function, env, machine).result))]
+        known = [[x or self.zero if x or new else None for x, new in zip(parts, there, strict=True)]
+                 for parts in before]  # fmt: skip
+        at.begin("1", at.any(at.apply("or", *masks)))
+        (cell,) = self.evaluated(function, self.again(function.params, env), machine)
+        own = [self.plain(part) or self.zero for part in self.parts(cell)]
+        found = [at.apply("select", mask, new, x) for mask, parts in zip(masks, known, strict=True)
+                 for new, x in zip(own, parts, strict=True) if x]  # fmt: skip
+        values = iter(at.end_or([x for parts in known for x in parts if x], found))
+        return [[next(values) if x else None for x in parts] for parts in known]
 
     def apart(self, function: Lam, env: Env, machine: Evaluator) -> bool:
         """Whether a row is worked out only where it is asked for: not where it is known further out, for all blocks."""
@@ -61,57 +75,28 @@ class RowText(FormulaText):
         """Whether a part is known in the innermost loop, and not further out."""
         return part is not None and self.at.depths.get(part, 0) == self.at.depth
 
-    def noted(self, functions: Sequence[Lam], env: Env) -> dict[str, str]:
-        """Where the parts are put that functions read: what is made of what is read in a block stays in that block."""
-        names = dict.fromkeys(name for function in functions for name in function.params)
-        parts = dict.fromkeys(part for name in names for part in self.parts(env[name]) if self.made_here(part))
-        noted = {part: self.at.room(1) for part in parts if part is not None}
-        for part, room in noted.items():
-            self.at.store(part, room)
-        return noted
+    def again(self, names: Sequence[str], env: Env) -> Env:
+        """The numbers that are known in the loop around this one by other names: what is made of them stays here."""
+        around, known = self.at.depth - 1, dict[str, str]()
 
-    def worked_out(
-        self, n: int, function: Lam, rooms: Sequence[Sequence[str | None]], i: int, env: Env, noted: dict[str, str],
-        machine: Evaluator,
-    ) -> None:  # fmt: skip
-        """Put a row for those cells of the block that ask for it, if there are any."""
-        at, masks = self.at, [self.at.same(row, n) for row in self.rows[i]]
-        at.begin("1", at.any(at.apply("or", *masks)))
-        known: dict[str, str] = {}
+        def part(x: str | None) -> str | None:
+            if x is None or self.at.depths.get(x, 0) != around:
+                return x
+            if x not in known:
+                known[x] = self.at.again(x)
+            return known[x]
 
-        def read(part: str | None) -> str | None:
-            if part is None or part not in noted:
-                return part
-            if part not in known:
-                known[part] = at.load(noted[part])
-            return known[part]
+        return {name: self.cell([part(x) for x in self.parts(env[name])]) for name in names}
 
-        def again(symbol: Symbol) -> Symbol:
-            return Symbol(*map(read, (symbol.v, symbol.e)), *(tuple(map(read, x)) for x in (symbol.t, symbol.et)))  # type: ignore[arg-type]
-
-        (cell,) = self.evaluated(function, {name: again(env[name]) for name in function.params}, machine)
-        for own, mask in zip(rooms, masks, strict=True):
-            self.put(own, cell, mask)
-        at.end()
-
-    def put(self, rooms: Sequence[str | None], cell: Symbol, mask: str | None = None) -> None:
-        """Put the parts of a cell, for the members of a mask."""
-        at = self.at
-        for room, part in zip(rooms, self.parts(cell), strict=True):
-            if room is not None:
-                value = self.plain(part) or self.zero
-                at.store(at.apply("select", mask, value, at.load(room)) if mask else value, room)
-
-    def taken(self, rooms: Sequence[str | None]) -> Symbol:
-        """The cell whose parts were put there."""
-        v, e, *rest = (None if room is None else self.at.load(room) for room in rooms)
-        assert v is not None
-        return Symbol(v, e, tuple(rest[: len(rest) // 2]), tuple(rest[len(rest) // 2 :]))
-
-    def parts(self, cell: Symbol | Packed) -> list[str | None]:
+    def parts(self, cell: Symbol | Packed) -> Parts:
         """The parts of a cell, with those that may be left out where there are none."""
         nothing = (None,) * (self.k1 - 1)
         return [cell.v, cell.e, *(cell.t or nothing), *(cell.et or nothing)]
+
+    def cell(self, parts: Parts) -> Symbol:
+        v, e, *rest = parts
+        assert v is not None
+        return Symbol(v, e, tuple(rest[: self.k1 - 1]), tuple(rest[self.k1 - 1 :]))
 
     def chosen(self, cells: Sequence[Symbol], row: str, numbers: Sequence[int]) -> Symbol:
         """Of some rows, which have these numbers, the one that is asked for; the first one if it is none of them."""
@@ -125,6 +110,4 @@ class RowText(FormulaText):
                 found = self.at.apply("select", mask, other, found)
             return found
 
-        v, e, *rest = map(part, zip(*map(self.parts, cells), strict=True))
-        assert v is not None
-        return Symbol(v, e, tuple(rest[: len(rest) // 2]), tuple(rest[len(rest) // 2 :]))
+        return self.cell(list(map(part, zip(*map(self.parts, cells), strict=True))))
