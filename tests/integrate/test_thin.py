@@ -45,3 +45,15 @@ def test_errors_cover_what_hardly_a_point_falls_into(
             found = program(t=at)
         for got, error, exact in ((found.value, found.error, value), (found.tangent, found.tangent_error, rate)):
             assert abs(got - exact) <= error + 1e-15 * abs(exact), (seed, got, error, exact)
+
+
+@pytest.mark.parametrize("width", [0.1, 0.02, 0.011, 1e-3, 4.1e-4])
+def test_a_thin_ring_has_all_digits_of_its_rate(width: float) -> None:
+    """4 pi t, by adaptive panels: those that crowd towards the inner circle, as the outer one is near, are not to crowd
+    until rounding is all that is left between the nodes, which left the rate 8 digits."""
+    f = potto.deriv(potto.compile(
+        "def f(R, t) integral ([-2, 2], [-2, 2]) [(sqrt(x^2 + y^2) - R)^2 < t^2] d(x, y)").f)  # fmt: skip
+    answer = f((1.1, 0.0), (width, 1.0))
+    assert abs(answer.value - 4.4 * math.pi * width) <= answer.error <= 1e-11
+    assert abs(answer.tangent - 4.4 * math.pi) <= answer.tangent_error <= 1e-9
+    assert answer.evals <= 5000

@@ -161,7 +161,7 @@ def _growth(work: PanelBatch, index: Ints, high: bool) -> Array:
     what it does there, 0 where it does nothing of the kind, next to what it is elsewhere, or no longer does close to
     the end: (m, S)."""
     seg = work.seg.pick(index)
-    turning = np.isin(seg.kind, (substitution.LEFT, substitution.RIGHT, substitution.BOTH))
+    turning = seg.turning
     end = np.abs(seg.b if high else seg.a)
     near = np.where(turning[:, None], np.array(NEAR_TURNING), np.array(NEAR))
     near = np.concatenate((near, near[:, 2:3]), axis=1)

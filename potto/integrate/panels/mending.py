@@ -29,7 +29,7 @@ def mend(evaluated: Evaluated, seg: Segments, index: Ints, u: Array, du: Array, 
     u, du: (P, n) as for the map. Of nodes so close to an end that integrals further in give up, of 1/(x + y) along y at
     x = 1e-20, nothing is known but that they count little if values grow slowly; they may be off by all that they are.
     """
-    turning = np.isin(seg.kind, (substitution.LEFT, substitution.RIGHT, substitution.BOTH))
+    turning = seg.turning
 
     def put(close: float, segments: Bools, doubt: float) -> bool:
         bad = ~np.isfinite(h).all(axis=0) & segments[:, None] & ((u < close) | (u > 1 - close))

@@ -11,7 +11,7 @@ import numpy as np
 
 from potto.integrate.columns import Columns, distinct
 from potto.integrate.rules.gauss import EPS
-from potto.kernels.cells import Array, Ints
+from potto.kernels.cells import Array, Bools, Ints
 
 LINEAR, LEFT, RIGHT, BOTH, UP, DOWN, WHOLE = range(7)
 # Powers by which a piece at the end of its segment is graded once it has shown itself not to be smooth there: so that
@@ -49,6 +49,11 @@ class Segments(Columns):
     da: Array
     db: Array
     pace: Array
+
+    @property
+    def turning(self) -> Bools:
+        """Whose map resolves a turning point, (S,)."""
+        return np.isin(self.kind, (LEFT, RIGHT, BOTH))
 
 
 def choose(a: Array, b: Array, left: Array, right: Array) -> Ints:

@@ -41,10 +41,10 @@ from potto.runtime.integration.methods.choices import (
     endless,
     many,
     passes_on,
-    preferred,
     to_be_seen,
     too_many,
     trial,
+    tried,
     worth_trials,
 )
 from potto.runtime.integration.methods.directions import by_directions
@@ -142,8 +142,10 @@ def along_cuts(problem: Problem) -> Sums:
     most = trial(problem)
     stopped: list[Attempt] = []
     tables: list[Attempt] | None = None
-    for order in preferred(problem):
-        found = attempted(problem, order, most)
+    for order, allowed in tried(problem, most):
+        found = attempted(problem, order, allowed)
+        if found.stopped and allowed != most:
+            continue
         if found.stopped and tables is None and endless(problem) and not found.events.every(Degenerate):
             tables = eliminated(problem) if passes_on(problem) else []
             if tables and accurate(tables[0].sums, machine.rtol, machine):

@@ -1,7 +1,7 @@
 """Iterated quadrature of a batch by one plan: whole boxes first, the rest cut, so many members at a time.
 
-Owns `in_parts`, `whole_boxes`, `cut_up` and `iterated`. Each loads what it rests on when it first runs: most integrals
-of a program are settled before any of them, and these are an eighth of the evaluator.
+Owns `in_parts`, `whole_boxes`, `cut_up`, `iterated` and `stretches`. Each loads what it rests on when it first runs:
+most integrals of a program are settled before any of them, and these are an eighth of the evaluator.
 """
 
 from __future__ import annotations
@@ -143,6 +143,16 @@ def iterated(plan: Plan, machine: Machine, env: dict[str, Value], batch: int, st
             parts.append(Iteration(plan, apart, order).whole(gather(env, index), index.stop - start))
             machine.events.take(apart.events, np.arange(index.start, index.stop))
     return Sums.joined(parts)
+
+
+def stretches(plan: Plan, machine: Machine, env: dict[str, Value], batch: int) -> int:
+    """Into how many stretches the cuts that have closed forms cut the outermost variable of a batch."""
+    from potto.integrate.decomposition.cuts import frame_rows, segments
+
+    level = plan.levels[0]
+    values = machine.looking_aside().tracking().evaluate(level.frame, env, None)
+    assert isinstance(values, tuple)
+    return segments(level, *frame_rows(level, values), batch, 0, None).segments.a.size
 
 
 def best_order(plan: Plan, machine: Machine, env: dict[str, Value], batch: int) -> int:
