@@ -136,7 +136,8 @@ def tried(problem: Problem, most: int | None) -> Iterator[tuple[Integral, int | 
     term, levels = problem.term, problem.plan().levels
     cuts = sum(len(own.level.cuts) for own in levels)
     second = problem.machine.record.second  # what has no meaning at single places there is met in some orders alone
-    if most is None or len(term.variables) != MOST_LEVELS or not _movable(term) or cuts > COMPARED or second:
+    written = most is None or second or endless(problem) or cuts > COMPARED  # of infinite ranges tables come next
+    if most is None or written or len(term.variables) != MOST_LEVELS or not _movable(term):
         yield from ((order, most) for order in preferred(problem))
         return
     if not any(own.searched or own.families or own.level.critical for own in levels):
