@@ -48,7 +48,7 @@ PROMISING = 1e-2
 # itself, however short the piece (`exp(t)` under a normal density). Where a map crowds nodes like squares already, a
 # grade brings them so close to the turning place that rounding is all that is left between them.
 ROUGH, SMOOTH = 1e-8, 1e-12
-ROUNDED = 8.0  # up to how many times its rounding an error is taken for that
+ROUNDED = 8.0  # up to how many times its rounding an error beside a turning place is taken for that
 TOO_LITTLE = 8  # how many times more than an error, or rounding, tells is missed
 COUNTS = 0.01  # the part of what an error may be from which on it counts what was missed beside an end
 LONG = 8  # after how many halvings it is looked for members that take longer than the others
@@ -186,12 +186,13 @@ def measured(work: PanelBatch, new: Pieces, order: int) -> Pieces:
     promising = (new.error <= PROMISING * by_either_form(work, new.size)).all(axis=0)
     if (graded := np.nonzero((new.end != 0) & promising)[0]).size:
         new.held_against(work.measure(new.places(graded), order + MORE), graded)
-    steep = np.abs(new.end) * np.where(work.seg.turning[new.segment], 2, 1) > GRADE
-    if (rough := np.nonzero(steep & (new.error + new.floor > ROUGH * new.size).any(axis=0))[0]).size:
+    turning = work.seg.turning[new.segment]
+    steep = np.abs(new.end) * np.where(turning, 2, 1) > GRADE
+    if (rough := np.nonzero(steep & (new.error + turning * new.floor > ROUGH * new.size).any(axis=0))[0]).size:
         level = new.places(rough)
         level.end = np.zeros(rough.size, dtype=np.int64)
         level = work.measure(level, order).settled()
-        least = np.maximum(SMOOTH * by_either_form(work, level.size), ROUNDED * level.floor)
+        least = np.maximum(SMOOTH * by_either_form(work, level.size), turning[rough] * ROUNDED * level.floor)
         smooth = (level.error <= least).all(axis=0)
         new.settled().put(rough[smooth], level.pick(smooth))
     return new
