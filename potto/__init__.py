@@ -12,7 +12,6 @@ if TYPE_CHECKING:
     from potto_repl.sliders import sliders
 
     from potto.applications.fitting import fit
-    from potto.applications.hessian import hessian, hvp
     from potto.bridges.to_jax import to_jax
     from potto.bridges.to_scipy import to_scipy
     from potto.bridges.to_torch import to_torch
@@ -22,6 +21,7 @@ if TYPE_CHECKING:
     from potto.python.api import Module, ProgramWarning, Workspace, compile, load
     from potto.python.functions import Function, deriv
     from potto.python.gradients import grad, jacobian, jvp, value_and_grad, vjp
+    from potto.python.hessian import hessian, hvp
     from potto.python.tiles import Interrupted
     from potto.runtime.answers.estimate import Estimate
 
@@ -64,8 +64,8 @@ _HOMES = {
     "deriv": "potto.python.functions",
     "fit": "potto.applications.fitting",
     "grad": "potto.python.gradients",
-    "hessian": "potto.applications.hessian",
-    "hvp": "potto.applications.hessian",
+    "hessian": "potto.python.hessian",
+    "hvp": "potto.python.hessian",
     "jacobian": "potto.python.gradients",
     "jvp": "potto.python.gradients",
     "load_ipython_extension": "potto_repl.magics",

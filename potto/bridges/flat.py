@@ -14,12 +14,12 @@ from typing import Any
 
 import numpy as np
 
-from potto.applications.hessian import hessian
 from potto.kernels.cells import Array
 from potto.kernels.errors import wrong_call
 from potto.python.arrays import axes_of
 from potto.python.functions import Function, component, must_be_function
 from potto.python.gradients import value_and_jacobian
+from potto.python.hessian import hessian
 from potto.python.named_parameters import Names, parameters_to_vary
 from potto.types import format_type
 from potto.types.types import ArrayOf, Dist, Parameter, Real, TupleOf, Type, TypeVariable, groups_of, resolve, result_of

@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from potto.applications.hessian import hessian, hvp
 from potto.kernels.cells import Array
 from potto.kernels.errors import wrong_call
 from potto.python.functions import Function, must_be_function
 from potto.python.gradients import value_and_jacobian
+from potto.python.hessian import hessian, hvp
 from potto.python.named_parameters import parameters_to_vary
 from potto.runtime.answers.estimate import Estimate
 

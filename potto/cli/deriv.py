@@ -128,9 +128,9 @@ def _numbers(options: argparse.Namespace, console: Console) -> int:
 
 def _taken(world: World, file: str, options: argparse.Namespace) -> tuple[Gradient, Gradient | None]:
     """The gradient, and the Hessian's product with the vector if one is given. Raises PottoError."""
-    from potto.applications.hessian import hvp
     from potto.python.functions import Function
     from potto.python.gradients import grad
+    from potto.python.hessian import hvp
 
     function = function_in(world, file, options.name)
     given = arguments_in(world, file, options.given)

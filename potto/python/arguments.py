@@ -32,6 +32,9 @@ NO_KIND = declare("P0523", "a Python value that is not a value of Potto")
 ToFunction = Callable[[Any], Value | None]
 
 
+LEAST = 2048  # members, from which on a batch has blocks: below, the calls for some would cost as much as all
+
+
 class Batch(Struct, frozen=True):
     """What arrays a call was given: the shape that they broadcast to; None when there are only numbers."""
 

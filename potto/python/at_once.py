@@ -21,9 +21,8 @@ from potto.diagnostics import PottoError
 from potto.integrate.costs import wanted
 from potto.kernels.cells import Cell, Value
 from potto.projects.settings import Settings
-from potto.python.arguments import LARGEST, Batch, with_axes, without_axes
+from potto.python.arguments import LARGEST, LEAST, Batch, with_axes, without_axes
 from potto.python.arrays import is_batch, shape_together
-from potto.python.tiles import LEAST
 from potto.runtime.answers.convergence import precise
 from potto.runtime.answers.estimate import Estimate
 from potto.runtime.evaluate import Clock, Program, bar, number, report, stats_of

@@ -16,9 +16,8 @@ from potto.elaborate import elaborate_expression
 from potto.evaluating.world import World
 from potto.kernels.cells import Value
 from potto.projects.settings import current
-from potto.python.arguments import Batch
+from potto.python.arguments import LEAST, Batch
 from potto.python.at_once import AtOnce, Together, at_once, together
-from potto.python.tiles import LEAST
 from potto.reports.render import Located, ProgramError
 from potto.runtime.answers.estimate import Estimate
 from potto.runtime.answers.records import named_answer

@@ -94,6 +94,10 @@ class Function(Travelling):
         self._groups: tuple[int, tuple[tuple[Parameter, ...], ...]] | None = None
         self._derivative: Function | None = None
 
+    def bare(self) -> Function:
+        """Itself without what it was given, as it travels."""
+        return type(self)(self._world, self._file, self._expr, self._whole)
+
     def __call__(self, *args: Any, **kwargs: Any) -> Any:
         args, kwargs = self.by_place(args, kwargs)
         known = None if kwargs else self.at_once(args)

@@ -12,7 +12,7 @@ from potto.evaluating.world import World
 from potto.kernels.cells import Value
 from potto.python.arguments import Batch, batch_of, value_of
 from potto.python.calls import Call
-from potto.python.gradients import gradient
+from potto.python.derived_calls import gradient
 from potto.python.slopes import Gradient
 from potto.runtime.answers.estimate import Estimate
 from potto.source import Span

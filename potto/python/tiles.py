@@ -18,25 +18,24 @@ from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future
 from contextlib import nullcontext
 from functools import cache
 from itertools import groupby, pairwise
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 from msgspec import Struct, field
 from msgspec.structs import asdict, replace
 
 from potto.diagnostics import PottoError
+from potto.evaluating.world import World
 from potto.integrate.costs import counting, wanted
 from potto.kernels.cells import Value, all_arrays, map_arrays
 from potto.kernels.making import making
 from potto.projects.settings import Settings, current, executor, settings
-from potto.python.arguments import Batch, cut, flattened
+from potto.python.arguments import LEAST, Batch, cut, flattened
+from potto.python.calls import Call
+from potto.python.derived_calls import gradient
 from potto.runtime.answers.batches import joined, unfinished, with_what_was_made
 from potto.runtime.answers.estimate import Estimate
 from potto.runtime.evaluation.record import advancing
 
-if TYPE_CHECKING:
-    from potto.python.functions import Function
-
-LEAST = 2048  # members, from which on a batch has blocks: below, the calls for some would cost as much as all
 # Members of a block: as many as take ENOUGH seconds at least, tried from PILOT on; after less than LITTLE with 64 times
 # as many, else with twice as many. What is cut in a block costs a few milliseconds whatever there is of it: 16 blocks
 # of what takes 20 ms in one would take 80. Longer blocks could not be shared evenly; but where a block costs far more
@@ -69,11 +68,25 @@ class Interrupted(KeyboardInterrupt):
         self.estimate = estimate
 
 
+class Tiled(Protocol):
+    """A function as tiles know it."""
+
+    _world: World
+    _file: str
+
+    def bare(self) -> Tiled:
+        """Itself without arguments, as it travels."""
+
+    def _arguments(self, given: Any) -> tuple[list[tuple[str, Value]], Batch]: ...
+
+    def _call(self, given: Any) -> Call: ...
+
+
 class Task(Struct, frozen=True):
     """Blocks of a batch as they travel: the function, its arguments in one row of members for each block, what it is
     differentiated by, how numbers are asked for, and whether books are kept of what they cost."""
 
-    function: Function
+    function: Tiled
     blocks: tuple[Any, ...]
     wrt: tuple[str, ...]
     settings: Settings
@@ -93,17 +106,15 @@ class Task(Struct, frozen=True):
 
 
 def whole(
-    function: Function, given: Any, wrt: tuple[str, ...], arguments: list[tuple[str, Value]], batch: Batch
+    function: Tiled, given: Any, wrt: tuple[str, ...], arguments: list[tuple[str, Value]], batch: Batch
 ) -> Estimate:
     """The estimate of a call for all members of a batch at once, with its derivatives by `wrt`."""
-    from potto.python.gradients import gradient  # which knows functions, and these their tiles
-
     call = function._call(given)
     return gradient(call, arguments, wrt, batch) if wrt else call.run([value for _, value in arguments], batch)
 
 
 def in_tiles(
-    function: Function, given: Any, wrt: tuple[str, ...], arguments: list[tuple[str, Value]], batch: Batch
+    function: Tiled, given: Any, wrt: tuple[str, ...], arguments: list[tuple[str, Value]], batch: Batch
 ) -> Estimate:
     """The estimate of a call, in tiles if its batch is large. Raises Interrupted, PottoError."""
     count = batch.size
@@ -116,7 +127,7 @@ def in_tiles(
         return whole(function, given, wrt, some, Batch((part[1] - part[0],)))
 
     chosen = current(function._world.settings(function._file))
-    bare = type(function)(function._world, function._file, function._expr, function._whole)
+    bare = function.bare()
 
     @cache
     def flat() -> Any:

@@ -17,7 +17,7 @@ from potto.kernels.cells import Cell, Rows, Value, map_cells
 from potto.kernels.errors import wrong_call
 from potto.python.arguments import batch_of
 from potto.python.functions import Function, bound, deriv
-from potto.python.gradients import grad, in_given_form
+from potto.python.gradient_functions import GradientFunction, in_given_form
 from potto.python.moving import PRIMAL
 from potto.python.named_parameters import Names, parameters_to_vary
 from potto.python.remade import remade
@@ -83,7 +83,7 @@ def second_gradient(function: Function, first: tuple[str, ...], then: tuple[str,
     where one of the parameters is not one number.
     """
     names = tuple(dict.fromkeys((*first, *then)))
-    slopes, curvatures = grad(function, first), hessian(function, names)
+    slopes, curvatures = GradientFunction(function, first), hessian(function, names)
 
     def twice(*args: Any, **kwargs: Any) -> Gradient:
         slope, matrix = slopes(*args, **kwargs), curvatures(*args, **kwargs)
