@@ -1,9 +1,9 @@
 """Derivatives of functions of Potto for Python: gradients, Jacobians, products with vectors from either side.
 
 Owns `grad`, `value_and_grad`, `jacobian`, `vjp` and `jvp`; their answers are in `slopes`. By many parameters it is
-differentiated in reverse, by few forward (`derived_calls`); both give the same. What is differentiated by is
-named; without names it is the first parameter. All numbers come with their errors, and arrays broadcast as in a call.
-Second derivatives are in `hessian`.
+differentiated in reverse, by few forward (`derived_calls`); both give the same. What is differentiated by is named;
+without names it is the first parameter. All numbers come with their errors, and arrays broadcast as in a call. Second
+derivatives are in `hessian`.
 """
 
 from __future__ import annotations
