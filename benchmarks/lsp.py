@@ -30,7 +30,7 @@ from lsp_whole import drawn, sizes_measured, table
 from lsp_workspace import resigned, workspace, written
 
 Row = tuple[str, str, float, str, float, float]  # gate, what, value, unit, goal, stretch
-RESTED = 3.0  # seconds of quiet after which a server has kept what it knows of a workspace
+RESTED = 8.0  # seconds of quiet after which a server has kept what it knows of a workspace
 
 
 def replace(line: int, start: int, end: int, text: str) -> dict[str, Any]:
