@@ -3,7 +3,7 @@
 mesh: the loss sum((integral - target)^2) of triangles with twelve parameters each, in all of them at once; the first
 call, and warm ones; with evaluations of integrands and compiled kernels, which must not grow with the directions.
 ways: one tangent for each parameter beside a tape, for scalars that all depend on each other (`dense`) and that hardly
-do (`sparse`): where they meet is `MANY` in `potto.python.gradients`.
+do (`sparse`): where they meet is `MANY` in `potto.python.derived_calls`.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import numpy as np
 
 import potto
 from potto.kernels import compile as kernels
-from potto.python import gradients
+from potto.python import derived_calls
 
 TRIANGLE = """
 def inside(ax, ay, bx, by, x, y) (bx - ax)*(y - ay) - (by - ay)*(x - ax)
@@ -85,7 +85,7 @@ def ways() -> None:
         for count in (4, 8, 12, 16, 32, 64):
             row = ""
             for many in (count + 1, 1):
-                gradients.MANY = many
+                derived_calls.MANY = many
                 kernels.clear()
                 f, at = kind(count)
                 f(**at)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import potto
-from potto.python import gradients, sided
+from potto.python import derived_calls, sided
 
 N = 9
 PROGRAM = potto.compile("""
@@ -59,9 +59,9 @@ def test_derivatives_on_both_sides_are_the_same_in_reverse_and_forward(
 ) -> None:
     """To 1e-13 of the largest: sums are added up in another order."""
     monkeypatch.setattr(sided, "BLOCK", 4)
-    monkeypatch.setattr(gradients, "MANY", 1)
+    monkeypatch.setattr(derived_calls, "MANY", 1)
     back = call()
-    monkeypatch.setattr(gradients, "MANY", 1 << 30)
+    monkeypatch.setattr(derived_calls, "MANY", 1 << 30)
     forward = call()
 
     def same(a: Any, b: Any) -> None:
@@ -77,7 +77,7 @@ def test_derivatives_on_both_sides_are_the_same_in_reverse_and_forward(
 
 
 def test_many_parameters_at_kinks_and_bounds_have_the_derivatives_of_the_whole(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(gradients, "MANY", 1)
+    monkeypatch.setattr(derived_calls, "MANY", 1)
     assert not potto.grad(PROGRAM.cubes)(NEAR).notes  # -3 and 3 times 0
     found = potto.grad(PROGRAM.both, ["p", "c"])(NEAR, 1.0)
     (note,) = found.notes
@@ -126,7 +126,7 @@ def test_edges_on_those_of_a_pixel_are_looked_at_by_what_moves_them(monkeypatch:
         assert found.value == pytest.approx(n / 32, abs=1e-15)  # half of a quarter, times a quarter: to rounding
         assert np.asarray(found.tangent[1]) == pytest.approx(np.full(n, 0.125), abs=1e-15)
     assert counts[4] <= 3 * 4 * counts[1]
-    monkeypatch.setattr(gradients, "MANY", 1)
+    monkeypatch.setattr(derived_calls, "MANY", 1)
     monkeypatch.setattr(sided, "MOST", 0)
     taped = potto.grad(module.mesh, ["p", "grey"])([triangle] * 4, np.full(4, 0.5)).evals
     assert taped <= 4 * counts[1]

@@ -15,7 +15,7 @@ import pytest
 from call_counts import calls_in
 
 import potto
-from potto.python import gradients
+from potto.python import derived_calls
 
 DIGITS = 40
 STEP = 2.3
@@ -140,9 +140,9 @@ def test_in_reverse_as_forward(monkeypatch: pytest.MonkeyPatch) -> None:
     terms = " + ".join(f"({k} + c)*[x < {name}*t + {names[k - 1]}^2/9]" for k, name in enumerate(names))
     f = potto.compile(f"def f(t, c, {', '.join(names)}) integral [0, 2*t] exp(x*t)/(40 + ({terms})/{n}) d(x)").f
     for at in (RNG.uniform(-0.3, 2.5, n).tolist() for _ in range(5)):
-        monkeypatch.setattr(gradients, "MANY", 1000)
+        monkeypatch.setattr(derived_calls, "MANY", 1000)
         forward = potto.grad(f, ["t", "c", *names])(t, c, *at)
-        monkeypatch.setattr(gradients, "MANY", 1)
+        monkeypatch.setattr(derived_calls, "MANY", 1)
         for wrt in (["t", "c", *names], [*names, "c", "t"]):
             first, again = potto.grad(f, wrt)(t, c, *at), potto.grad(f, wrt)(t, c, *at)
             assert (again.tangent, again.tangent_error) == (first.tangent, first.tangent_error) and first.converged

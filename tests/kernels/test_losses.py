@@ -14,7 +14,7 @@ import pytest
 from mpmath import mp
 
 import potto
-from potto.python import gradients
+from potto.python import derived_calls
 
 Slopes = Callable[[mp.mpf], tuple[mp.mpf, mp.mpf]]
 SMALL = (1e-8, 1e-4, 0.1, 0.7)
@@ -101,7 +101,7 @@ def test_bars_of_slopes_hold(
     """Both ways that tangents go, forward and back along a tape."""
     program = potto.compile(f"def f(x) {text}\ndef g(x) snd(deriv(f)((x, 1)))\n")
     first, second = potto.deriv(program.f), potto.deriv(program.g)
-    monkeypatch.setattr(gradients, "MANY", 1)  # by a tape from one parameter on
+    monkeypatch.setattr(derived_calls, "MANY", 1)  # by a tape from one parameter on
     back = potto.grad(program.f)
     for x in points:
         with mp.workdps(60):

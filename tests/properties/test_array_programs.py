@@ -19,7 +19,7 @@ from program_arrays import array_program, given_arrays
 from program_checks import Wrong, asked, held, where
 
 import potto
-from potto.python import gradients
+from potto.python import derived_calls
 
 EACH = examples(6, 100)
 # What a run on new programs may have, as of programs without arrays.
@@ -64,7 +64,7 @@ def test_slopes_by_elements_add_up_to_those_along_a_direction(chunk: int, monkey
         if along.notes or not along.converged:
             continue  # where it has two sides each way may take another one
         for many in (1, 10**9):
-            monkeypatch.setattr(gradients, "MANY", many)
+            monkeypatch.setattr(derived_calls, "MANY", many)
             slopes = potto.grad(module.g, list(given))(**given)
             parts = np.array([slope * step for slope, step in zip(leaves(slopes.tangent), steps, strict=True)])
             bars = float(np.sum(np.abs(steps) * np.array(list(leaves(slopes.tangent_error)))))

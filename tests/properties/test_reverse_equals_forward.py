@@ -17,7 +17,7 @@ from how_many import examples
 from program_source import random_program
 
 import potto
-from potto.python import gradients
+from potto.python import derived_calls
 
 NAMES = ("a", "b", "c", "d")
 ULPS = 1e-13  # of the size of what is added up: some hundred roundings
@@ -68,7 +68,7 @@ def program(seed: int) -> tuple[str, tuple[float, ...]]:
 
 
 def gradient(monkeypatch: pytest.MonkeyPatch, function: Any, at: tuple[Any, ...], many: int) -> Any:
-    monkeypatch.setattr(gradients, "MANY", many)
+    monkeypatch.setattr(derived_calls, "MANY", many)
     return potto.grad(function, NAMES)(*at)
 
 

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
 import potto
-from potto.python import gradients
+from potto.python import derived_calls
 
 MODULE = potto.compile("""
 def total(xs: [n] Real, k) sum i in 0..n-1 (k*xs[i]^2)
@@ -177,7 +177,7 @@ def test_what_does_not_fit_is_said(call: Any, why: str) -> None:
 
 @pytest.fixture(params=[1 << 30, 1], ids=["forward", "reverse"])
 def way(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(gradients, "MANY", request.param)
+    monkeypatch.setattr(derived_calls, "MANY", request.param)
 
 
 @pytest.mark.usefixtures("way")

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from mpmath import mp, mpf
 
 import potto
-from potto.python import gradients
+from potto.python import derived_calls
 from potto.runtime.evaluation.folds import folds, linear
 
 DIGITS = 400  # what is chaotic loses one in two steps
@@ -281,7 +281,7 @@ def both_ways(function: Any, wrt: list[str], *args: Any) -> tuple[Any, Any]:
     found = []
     for many in (1 << 30, 1):
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(gradients, "MANY", many)
+            patch.setattr(derived_calls, "MANY", many)
             found.append(potto.grad(function, wrt)(*args))
     return found[0], found[1]
 
@@ -367,7 +367,7 @@ def turned(k, n)
         f = potto.compile(text).turned
         if way == "forward":
             return potto.deriv(f)((0.3, 1.0), (600.0, 0.0))
-        monkeypatch.setattr(gradients, "MANY", 0)
+        monkeypatch.setattr(derived_calls, "MANY", 0)
         return potto.grad(f, "k")(0.3, 600.0)
 
     whole = answer()
