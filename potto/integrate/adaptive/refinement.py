@@ -152,9 +152,8 @@ def too_coarse(work: PanelBatch, p: Pieces, ends: Any, tally: Tally) -> Any:
     k = work.k
     if work.both:  # per direction the better of the two forms, or the one that tells
         told = error[:, 1 + k :] < error[:, 1 : 1 + k] if tally.fixed is None else tally.fixed[:, :, owner]
-        error, floor = (
-            np.concatenate((x[:, :1], np.where(told, x[:, 1 + k :], x[:, 1 : 1 + k])), axis=1) for x in (error, floor)
-        )
+        error = np.concatenate((error[:, :1], np.where(told, error[:, 1 + k :], error[:, 1 : 1 + k])), axis=1)
+        floor = floor[:, : 1 + k]  # of what moves: how a bound moves shows what rounding leaves of it
     if work.endless is not None:
         error = error.copy()
         error[:, 1 : 1 + k] = np.where(work.endless[:, owner] == 0, error[:, 1 : 1 + k], 0.0)
