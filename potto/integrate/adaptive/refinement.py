@@ -19,6 +19,7 @@ from potto.integrate.panels.iterated import siblings
 from potto.integrate.panels.panel_batch import PanelBatch
 from potto.integrate.pieces import Ends, Pieces
 from potto.integrate.rules import substitution
+from potto.integrate.rules.gauss import EPS
 from potto.kernels.cells import Array, Bools, Ints
 
 # How much larger than at the nodes an integrand must be at an end of a segment to be taken for a peak.
@@ -103,7 +104,8 @@ class Tally:
 
     def settle_forms(self, work: PanelBatch, p: Pieces) -> bool:
         """Settle which form tells each derivative, the one with the smaller bound. Whether that asks for more: as long
-        as either may, pieces do that are accurate in one, though of their sum only one is the answer."""
+        as either may, pieces do that are accurate in one, though of their sum only one is the answer. Not where
+        rounding leaves more than that of how bounds move: the other form doesn't see it."""
         k = work.k
         if not work.both or self.fixed is not None:
             return False
@@ -114,7 +116,7 @@ class Tally:
         limits = self.limits(work).reshape(work.width, 1 + k, -1)[:, 1:]
         if work.endless is not None:
             left = np.where(work.endless == 0, left, 0.0)
-        if not (left > limits).any():
+        if not (left > limits).any() or (floor[:, 1 : 1 + k] > limits).any():
             return False
         self.fixed = fixed
         return True
@@ -123,7 +125,9 @@ class Tally:
 def spared(work: PanelBatch) -> Array | None:
     """How many times the error of each integral may be larger than that of others, since it counts so much less: (B,).
     What is not resolved at all says nothing of its error."""
-    return None if work.slack is None else np.minimum(work.slack, np.maximum(1.0, LEAST / work.machine.rtol))
+    if work.slack is None:
+        return None
+    return np.minimum(work.slack, np.maximum(1.0, LEAST / max(work.machine.rtol, EPS)))
 
 
 def filled(work: PanelBatch, p: Pieces) -> Array:
