@@ -82,3 +82,23 @@ def test_a_ball_that_a_saddle_cuts_costs_the_same_along_any_axis() -> None:
         assert abs(answer.value - half) <= answer.error <= 1e-10
         assert abs(answer.tangent - PI * 0.8**0.5) <= answer.tangent_error <= 1e-10
         assert answer.evals <= 100_000  # with z outermost, 800,000
+
+
+def test_orders_are_compared_where_a_bound_moves() -> None:
+    """Along z roots are searched for, along x and y none are. Below x + y = w <= 1 lies w^2/2 of the unit square."""
+    f = potto.deriv(potto.compile("def f(t) integral ([0, 1], [0, 1], [0, t]) [z^5 + z < x + y] d(x, y, z)").f)
+    t = 0.5
+    answer = f((t, 1.0))
+    assert abs(answer.value - (t - (t**11 / 11 + 2 * t**7 / 7 + t**3 / 3) / 2)) <= answer.error <= 1e-12
+    assert abs(answer.tangent - (1 - (t**5 + t) ** 2 / 2)) <= answer.tangent_error <= 1e-12
+
+
+def test_a_torus_is_filled_up_to_a_bound_that_moves() -> None:
+    """At height z its section is a ring between R - w and R + w, w^2 = r^2 - z^2: 4 pi R w. Here R = 1, r = 0.3."""
+    ring = "(sqrt(x^2 + y^2) - 1)^2 + z^2 < 0.09"
+    f = potto.deriv(potto.compile(f"def f(t) integral ([-2, 2], [-2, 2], [-1, t]) [{ring}] d(x, y, z)").f)
+    r, t = 0.3, 0.1
+    w, answer = math.sqrt(r**2 - t**2), f((t, 1.0))
+    filled = 2 * PI * (t * w + r**2 * (math.asin(t / r) + PI / 2))
+    assert abs(answer.value - filled) <= answer.error <= 1e-9
+    assert abs(answer.tangent - 4 * PI * w) <= answer.tangent_error <= 1e-9

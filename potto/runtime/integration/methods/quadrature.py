@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from potto.integrate.pieces import Shaped, Sums, gather
+from potto.integrate.pieces import Shaped, Sums, gather, still
 from potto.integrate.plan import Plan
 from potto.kernels.cells import Bools, Ints, Value
 from potto.runtime.answers.convergence import rounded
@@ -150,7 +150,8 @@ def stretches(plan: Plan, machine: Machine, env: dict[str, Value], batch: int) -
     from potto.integrate.decomposition.cuts import frame_rows, segments
 
     level = plan.levels[0]
-    values = machine.looking_aside().tracking().evaluate(level.frame, env, None)
+    resting = {name: still(env[name]) for name in level.frame.params}
+    values = machine.looking_aside().tracking().evaluate(level.frame, resting, None)
     assert isinstance(values, tuple)
     return segments(level, *frame_rows(level, values), batch, 0, None).segments.a.size
 
