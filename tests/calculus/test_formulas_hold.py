@@ -25,7 +25,7 @@ from potto.types.types import Function
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 WITHOUT = {
-    "hidden.po:pixel", "plate.po:stepped",  # too long to be read
+    "hidden.po:pixel", "plate.po:stepped", "room.po:discomfort",  # too long to be read
     "geometry.po:pixel", "main.po:two_tones", "main.po:by_law", "shadows.po:sharp", "sphere.po:pixel",
     "sphere.po:shaded", "stylize.po:pixel", "shadows.po:softly",
 }  # fmt: skip
@@ -92,6 +92,29 @@ def test_a_formula_is_0_where_a_factor_without_a_value_counts_for_nothing(
     module = shown.module()
     assert module.eval(f"shown_1({above}, 1)").value == pytest.approx(slope, rel=1e-12, abs=1e-12)
     assert module.eval(f"shown_1({-above}, 1)").value == 0
+
+
+NARROW = [
+    ("[0.3 < y < 0.31]", 0.01),
+    ("[x - 0.01 < y < x]", 0.01),
+    ("max(y - 0.99, 0)", 0.01**2 / 2),
+    ("([0.3 < y < 0.31] - [0.5 < y < 0.52])", 0.01 - 0.02),
+]
+
+
+@pytest.mark.parametrize(("factor", "slope"), NARROW)
+def test_a_fall_in_a_narrow_place_counts(factor: str, slope: float) -> None:
+    """The width of the strip at x = t (to 1e-12, in doubles). Points that are tried hardly lie in it, so that nothing
+    seemed to fall there."""
+    shown = Shown(f"def f(t) integral ([0, 1], [0, 1]) [x < t]*{factor} d(x, y)\n", "f")
+    assert shown.problems() == []
+    assert shown.module().eval("shown_1(0.5, 1)").value == pytest.approx(slope, rel=1e-12, abs=1e-12)
+
+
+def test_a_delta_in_a_narrow_place_is_shown() -> None:
+    shown = Shown("def f(x, y, t) [x < t]*[x - 0.01 < y < x]\n", "f")
+    assert shown.text.continuous == ()
+    assert "(dt - dx)*[y < x and x < y + 0.01]*delta(t - x)" in shown.text.deltas
 
 
 def test_equations_that_lead_back_to_each_other_are_given_up(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -18,6 +18,7 @@ from potto.calculus.algebra.ranges import Box
 from potto.calculus.algebra.rational_form import is_zero
 from potto.calculus.differentiation.between import between, scaled
 from potto.calculus.differentiation.derivative import partial, total, vanishes, zero_like
+from potto.calculus.differentiation.on_all_sides import is_zero_on_all_sides
 from potto.calculus.solving.pivots import NoClosedForm as NoClosedForm
 from potto.calculus.solving.pivots import Roots, SurfaceRoot, chosen, conjunction, pivots
 from potto.calculus.solving.solve import factors
@@ -158,7 +159,7 @@ def _at_root(
         return
     instances = _instances(node.body, sums, root.at.free)
     fall = substitute(_fall(node.body, flips, sums, instances, box_of(node)), {root.variable: root.at})
-    if vanishes(fall) or (exactly and not isinstance(zero_like(fall), Tuple) and is_zero(unguarded(fall))):
+    if vanishes(fall) or (exactly and is_zero_on_all_sides(fall)):
         return
     gain = scaled(fall, speed)
     lo, hi = node.bounds[node.variables.index(root.variable)]

@@ -7,11 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from potto.calculus.algebra.rational_form import is_zero
 from potto.calculus.differentiation.boundary_terms import JumpTerm
+from potto.calculus.differentiation.on_all_sides import is_zero_on_all_sides
 from potto.calculus.solving.solve import Sections, sections
-from potto.calculus.surfaces.branch_assignment import unguarded
-from potto.core.terms import Term, Tuple, substitute
+from potto.core.terms import substitute
 
 
 def continuous(item: JumpTerm, names: Iterable[str]) -> bool:
@@ -26,9 +25,5 @@ def continuous(item: JumpTerm, names: Iterable[str]) -> bool:
             continue
         found = sections(item.surface, name)
         if isinstance(found, Sections) and found.complete and found.roots and not found.families:
-            return all(_vanishes(substitute(item.jump, {name: unguarded(root)})) for root in found.roots)
+            return all(is_zero_on_all_sides(substitute(item.jump, {name: root})) for root in found.roots)
     return False
-
-
-def _vanishes(term: Term) -> bool:
-    return all(map(_vanishes, term.items)) if isinstance(term, Tuple) else is_zero(term)
