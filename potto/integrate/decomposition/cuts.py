@@ -265,12 +265,12 @@ def _sorted(
     x, e, inside = x[order, member], e[order, member], inside[order, member]
     most = np.minimum(e[1:] + e[:-1], _one_place(x[0], x[-1], x[1:]))  # roots that merge may be off by anything
     close = (x[1:] - x[:-1] <= most) & inside[1:] & inside[:-1]
+    rank: Ints = np.where(inside, np.array([0, *(_rank(plan, r) for r in rows), 0])[order], 0)
     if close.any():  # to rounding they are at one place
         for i in np.nonzero(close.any(axis=1))[0]:
-            x[i + 1] = np.where(close[i], x[i], x[i + 1])
             wide = np.where(close[i], BLUR * (e[i] + e[i + 1] + EPS * np.abs(x[i])), 0.0)
             blur[i], blur[i + 1] = np.maximum(blur[i], wide), np.maximum(blur[i + 1], wide)
-    rank: Ints = np.where(inside, np.array([0, *(_rank(plan, r) for r in rows), 0])[order], 0)
+        _put_at_one_place(x, e, close, rank)
     if t.shape[0]:
         t = t[:, order, member]
         near = (x[1:] - x[:-1] <= NARROW * np.abs(x[1:])) & inside[1:] & inside[:-1]
@@ -288,6 +288,18 @@ def _rank(plan: LevelPlan, row: Row) -> int:
     if row.cut < 0:
         return 0
     return 2 if plan.level.cuts[row.cut].decides else 1
+
+
+def _put_at_one_place(x: Array, e: Array, close: Bools, rank: Ints) -> None:
+    """Cuts that rounding does not tell apart are where that one is that jumps, and of several the best known: what
+    crosses a jump that moves is worked out at its place, and a double root beside it may be off by 1e-8."""
+    rank, e = rank.copy(), e.copy()
+    met = np.nonzero(close.any(axis=1))[0].tolist()
+    for i in [*met, *reversed(met)]:
+        first = (rank[i] > rank[i + 1]) | ((rank[i] == rank[i + 1]) & (e[i] <= e[i + 1]))
+        for taker, giver, of in ((i + 1, i, close[i] & first), (i, i + 1, close[i] & ~first)):
+            for known in (x, e, rank):
+                known[taker] = np.where(of, known[giver], known[taker])
 
 
 def _agree(t: Array, same: Bools, rank: Ints) -> None:
