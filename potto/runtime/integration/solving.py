@@ -142,7 +142,7 @@ def along_cuts(problem: Problem) -> Sums:
     most = trial(problem)
     stopped: list[Attempt] = []
     tables: list[Attempt] | None = None
-    for order, allowed in tried(problem, most):
+    for order, allowed, at_once in tried(problem, most):
         found = attempted(problem, order, allowed)
         if found.stopped and allowed != most:
             continue
@@ -150,7 +150,7 @@ def along_cuts(problem: Problem) -> Sums:
             tables = eliminated(problem) if passes_on(problem) else []
             if tables and accurate(tables[0].sums, machine.rtol, machine):
                 return tables[0].sums
-        if most is not None and found.stopped and uncertainty(found.sums) < PROMISING:
+        if at_once and most is not None and found.stopped and uncertainty(found.sums) < PROMISING:
             found = best((found, attempted(problem, order, LONGER * most)))
         along = found.events.every(Degenerate)
         if not along and not found.stopped and (most is None or uncertainty(found.sums) < math.inf):

@@ -127,8 +127,9 @@ def preferred(problem: Problem) -> Iterable[Integral]:
     return sorted(orders(problem.term), key=lambda order: problem.plan(order).searches)
 
 
-def tried(problem: Problem, most: int | None) -> Iterator[tuple[Integral, int | None]]:
-    """The orders to try, each with the evaluations that it may take. most: those of a trial.
+def tried(problem: Problem, most: int | None) -> Iterator[tuple[Integral, int | None, bool]]:
+    """The orders to try, each with the evaluations that it may take, and whether it gets more at once if that promises
+    something. most: those of a trial.
 
     Of three variables those orders come first that cut the outermost one at the fewest places, after a glance at the
     one that is written if that does without searches.
@@ -138,11 +139,11 @@ def tried(problem: Problem, most: int | None) -> Iterator[tuple[Integral, int | 
     second = problem.machine.record.second  # what has no meaning at single places there is met in some orders alone
     written = most is None or second or endless(problem) or cuts > COMPARED  # of infinite ranges tables come next
     if most is None or written or len(term.variables) != MOST_LEVELS or not _movable(term):
-        yield from ((order, most) for order in preferred(problem))
+        yield from ((order, most, True) for order in preferred(problem))
         return
     if not any(own.searched or own.families or own.level.critical for own in levels):
-        yield term, most // GLANCE
-    yield from ((order, most) for order in _fewest_cuts(problem))
+        yield term, most // GLANCE, False
+    yield from ((order, most, False) for order in _fewest_cuts(problem))
 
 
 def _searched(problem: Problem, order: Integral) -> tuple[int, int]:
