@@ -162,14 +162,21 @@ def _slope(module: potto.Module, name: str, t: float, c: float, dt: float, dc: f
     return (4 * quotient(step / 2) - quotient(step)) / 3
 
 
+def _is_told(shown: Shown, text: str) -> bool:
+    """Whether a formula is shown, which then parses and checks; else it is said why not."""
+    if not shown.text.tangent:
+        assert shown.text.problems or any(item.reason for item in shown.text.integrals), text
+        return False
+    assert shown.problems() == [], (text, shown.text.tangent)
+    return True
+
+
 def _check_generated(seed: int) -> None:
     rng = random.Random(seed)
     text = definition(rng)
     shown = Shown(text, "f")
-    if not shown.text.tangent:
-        assert shown.text.problems or any(item.reason for item in shown.text.integrals), text
+    if not _is_told(shown, text):
         return
-    assert shown.problems() == [], (text, shown.text.tangent)
     module = shown.module()
     for _ in range(2):
         t, c, dt, dc = (round(rng.uniform(0.3, 0.9), 3) for _ in range(4))
@@ -190,33 +197,31 @@ def test_many_generated(block: int) -> None:
         _check_generated(seed)
 
 
-def _check_any(seed: int) -> None:
+def _check_any(seed: int) -> bool:
     """Formulas of programs with functions, arrays and sums, against `deriv`, which finds roots and slopes by numbers:
-    to 1e-6, between the 1e-8 that integrals are asked for and the least that a wrong term would add."""
+    to 1e-6, between the 1e-8 that integrals are asked for and the least that a wrong term would add. Whether there was
+    a place to ask at."""
     rng = random.Random(seed)
     text, _ = program(rng)
     shown = Shown(text, "f")
-    if not shown.text.tangent:
-        assert shown.text.problems or any(item.reason for item in shown.text.integrals), text
-        return
-    assert shown.problems() == [], (text, shown.text.tangent)
+    if not _is_told(shown, text):
+        return True
     module = shown.module()
     for _ in range(2):
         try:
             given, derivative = _given(shown, module, rng)
         except NoPlace:  # of sqrt(x + t) from -1 there is no value at any t below 1
-            return
+            return False
         found = module.eval(shown.formula(given))
         assert near(found.value, derivative.value), (text, shown.text.tangent, shown.formula(given))
+    return True
 
 
-@pytest.mark.parametrize("seed", range(20))
-def test_any_program(seed: int) -> None:
-    _check_any(seed)
+def test_any_program() -> None:
+    assert sum(map(_check_any, range(20))) >= 19
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("block", range(examples(2, 20)))
 def test_many_programs(block: int) -> None:
-    for seed in range(50 * block, 50 * block + 50):
-        _check_any(seed)
+    assert sum(map(_check_any, range(50 * block, 50 * block + 50))) >= 48

@@ -209,17 +209,24 @@ def test_batches_are_answered_the_same_from_the_second_call_on(
                 assert list(map(str, found.notes)) == list(map(str, general.notes))
 
 
-def test_arguments_by_name_are_those_by_place(monkeypatch: pytest.MonkeyPatch) -> None:
-    """They are answered at once as well; what is missing or unknown is told as ever."""
-    f, answered = potto.compile("def f(a, b) integral [0, 1] exp(b*x)*[x < a] d(x)").f, []
+@pytest.fixture
+def answered(monkeypatch: pytest.MonkeyPatch) -> list[bool]:
+    """Of each call that asks for it, whether it was answered at once."""
+    told: list[bool] = []
     at_once = Call.at_once
 
     def spied(self: Call, *given: Any) -> potto.Estimate | None:
         found = at_once(self, *given)
-        answered.append(found is not None)
+        told.append(found is not None)
         return found
 
     monkeypatch.setattr(Call, "at_once", spied)
+    return told
+
+
+def test_arguments_by_name_are_those_by_place(answered: list[bool]) -> None:
+    """They are answered at once as well; what is missing or unknown is told as ever."""
+    f = potto.compile("def f(a, b) integral [0, 1] exp(b*x)*[x < a] d(x)").f
     for call in (f, potto.grad(f, ["b", "a"])):
         answered.clear()
         by_place = call(0.5, 1.5), call(0.5, 1.5)
@@ -231,17 +238,9 @@ def test_arguments_by_name_are_those_by_place(monkeypatch: pytest.MonkeyPatch) -
                 call(**wrong)
 
 
-def test_batches_go_straight_to_the_integral(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_batches_go_straight_to_the_integral(answered: list[bool]) -> None:
     """And what is to be told of them is told as ever: at t = 1 the edge lies on the bound."""
-    f, answered = potto.grad(potto.compile("def f(t) integral [0, 1] exp(x)*[x < t] d(x)").f), []
-    at_once = Call.at_once
-
-    def spied(self: Call, *given: Any) -> potto.Estimate | None:
-        found = at_once(self, *given)
-        answered.append(found is not None)
-        return found
-
-    monkeypatch.setattr(Call, "at_once", spied)
+    f = potto.grad(potto.compile("def f(t) integral [0, 1] exp(x)*[x < t] d(x)").f)
     plain, on_bound = np.linspace(0.1, 0.9, 50), np.linspace(0.02, 1.0, 50)
     for t in (plain, plain, on_bound, on_bound, plain[:7]):
         found = f(t)
