@@ -20,7 +20,7 @@ from potto.types.scope import InterfaceName, Meaning, RecursiveName, names_at_to
 from potto.types.types import UNKNOWN, Meta, RecordName, TupleOf, Type, Unknown, resolve, result_of
 from potto.types.unify import open_type
 
-_NUMBERS = ("float", "double", "real", "number", "int", "f64", "f32", "scalar")
+_NUMBERS = ("float", "double", "real", "number", "int", "f64", "f32", "scalar", "ℝ")
 
 
 def labelled(item: nodes.Definition, file: str, body: Type) -> Type:

@@ -163,11 +163,12 @@ def undefined(outside: Outside, scope: Iterable[str], node: nodes.Name) -> Diagn
             help="write `print(…)` at the top of a script, in a line of its own",
         )
     near = near_names(name, (*scope, *_near_at_top(outside.db, outside.file, name)))
-    help = _as_measure(name) or known_elsewhere(name) or did_you_mean(near)
+    told_of_name = _as_measure(name) or _as_type(name) or known_elsewhere(name)
+    help = told_of_name or did_you_mean(near)
     module = elsewhere(outside.db, outside.file, name)
     if module is not None:
         help = f"the module `{module}` defines it: add `from {module} import {name}`"
-    told = bool(_as_measure(name) or known_elsewhere(name)) or module is not None
+    told = bool(told_of_name) or module is not None
     meant = called_here(name) or (() if told else near)
     return NOT_DEFINED(
         node.span, f"`{name}` is not defined", label="not defined here", help=help,
@@ -180,6 +181,13 @@ def _as_measure(name: str) -> str:
     if name not in MEASURES:
         return ""
     return f"a measure stands among the bounds of an integral: `integral (x ~ {name}(…)) body d(x)`"
+
+
+def _as_type(name: str) -> str:
+    """Where a type goes, of one that stands where a number is expected: `def f(c): Real`."""
+    if name not in ("Real", "Dist", "Diffeo"):
+        return ""
+    return f"`{name}` is a type; that of a result stands after an arrow: `def f(c: Real) -> Real`"
 
 
 def undefined_member(outside: Outside, scope: Scope, node: nodes.Member) -> Diagnostic | None:

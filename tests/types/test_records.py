@@ -122,7 +122,8 @@ def test_with_behind_what_has_no_fields():
 
 
 @pytest.mark.parametrize(
-    ("written", "meant"), [("Camra", ("Camera",)), ("float", ("Real",)), ("camera", ("Camera",)), ("Mesh", ())]
+    ("written", "meant"),
+    [("Camra", ("Camera",)), ("float", ("Real",)), ("ℝ", ("Real",)), ("camera", ("Camera",)), ("Mesh", ())],
 )
 def test_the_type_that_may_be_meant(written, meant):
     found = only(f"record Camera(focal: Real)\ncamer = 1\ndef f(c: {written}) c.focal")

@@ -31,6 +31,7 @@ def test_names() -> None:
 
 def test_near_names_and_the_blanks_around_a_dot() -> None:
     assert only("radius = 2\ndef f(x) raduis*x").help == "did you mean `radius`?"
+    assert "after an arrow" in only("def f(c: Real): Real\n    c").help
     assert "`c . x`" in only(r"k = \c . c.x").help
     camera = "record Camera(focal: Real)\n"
     assert only(camera + r"k = \c . c.focal").help == r"say what it is: `\(c: Camera) . …`"
