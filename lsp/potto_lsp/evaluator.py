@@ -124,13 +124,15 @@ def _end_with(parent: int) -> None:
 
 def _answer(world: World, task: Mapping[str, Any]) -> dict[str, Any]:
     """The outcome of a task: `result`, or `error` as a text for the user."""
-    world.files.set_roots(task["roots"])
+    if world.files.roots != tuple(task["roots"]):  # setting them lists the workspace
+        world.files.set_roots(task["roots"])
     for key, text in task["texts"].items():
         if text is None:
             world.files.close(key)
         else:
             world.put(key, text)
-    world.refresh()
+    if task["do"] != "view":  # which looks at the disk as often as a drag leaves time for it
+        world.refresh()
     try:
         return {"result": TASKS[task["do"]](world, task)}
     except ProgramError as error:

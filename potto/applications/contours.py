@@ -15,6 +15,11 @@ _LINES = {
     1: ((3, 0),), 2: ((0, 1),), 3: ((3, 1),), 4: ((1, 2),), 5: ((3, 0), (1, 2)), 6: ((0, 2),), 7: ((3, 2),),
     8: ((2, 3),), 9: ((2, 0),), 10: ((0, 1), (2, 3)), 11: ((2, 1),), 12: ((1, 3),), 13: ((1, 0),), 14: ((0, 3),),
 }  # fmt: skip
+_COUNTS = np.array([len(_LINES.get(kind, ())) for kind in range(16)])
+_EDGES = np.zeros((16, 2, 2), dtype=int)
+for _kind, _lines in _LINES.items():
+    _EDGES[_kind, : len(_lines)] = _lines
+_ENDS = np.array([(0, 0, 0, 1), (0, 1, 1, 1), (1, 0, 1, 1), (0, 0, 1, 0)])  # of edges: row and column of both
 
 
 def zero_lines(values: Array, xs: Array, ys: Array) -> Array:
@@ -24,20 +29,19 @@ def zero_lines(values: Array, xs: Array, ys: Array) -> Array:
     code = (positive[:-1, :-1] * 1 + positive[:-1, 1:] * 2 + positive[1:, 1:] * 4 + positive[1:, :-1] * 8).astype(int)
     corners = np.isfinite(values)
     known = corners[:-1, :-1] & corners[:-1, 1:] & corners[1:, 1:] & corners[1:, :-1]
-    found = []
-    for kind, lines in _LINES.items():
-        row, column = np.nonzero(known & (code == kind))
-        for first, last in lines:
-            ends = [_crossing(values, xs, ys, row, column, edge) for edge in (first, last)]
-            found.append(np.stack(ends, axis=1))
-    return np.concatenate(found)
+    cells = np.nonzero(known & (_COUNTS[code] > 0))
+    number = _COUNTS[code[cells]]
+    row, column = (np.repeat(at, number) for at in cells)
+    second = np.concatenate(([False], (row[1:] == row[:-1]) & (column[1:] == column[:-1]))).astype(int)
+    edges = _EDGES[code[row, column], second[: len(row)]]
+    return _crossings(values, xs, ys, row[:, None], column[:, None], edges)
 
 
-def _crossing(values: Array, xs: Array, ys: Array, row: Ints, column: Ints, edge: int) -> Array:
-    """Where the function is zero on an edge of cells: (n, 2)."""
-    (r0, c0), (r1, c1) = {0: ((0, 0), (0, 1)), 1: ((0, 1), (1, 1)), 2: ((1, 0), (1, 1)), 3: ((0, 0), (1, 0))}[edge]
-    a, b = values[row + r0, column + c0], values[row + r1, column + c1]
+def _crossings(values: Array, xs: Array, ys: Array, row: Ints, column: Ints, edges: Ints) -> Array:
+    """Where the function is zero on edges (n, 2) of cells: (n, 2, 2)."""
+    r0, c0, r1, c1 = (row + _ENDS[edges, 0], column + _ENDS[edges, 1], row + _ENDS[edges, 2], column + _ENDS[edges, 3])
+    a, b = values[r0, c0], values[r1, c1]
     share = a / np.where(a == b, 1.0, a - b)
-    x = xs[column + c0] + share * (xs[column + c1] - xs[column + c0])
-    y = ys[row + r0] + share * (ys[row + r1] - ys[row + r0])
+    x = xs[c0] + share * (xs[c1] - xs[c0])
+    y = ys[r0] + share * (ys[r1] - ys[r0])
     return np.stack((x, y), axis=-1)

@@ -6,6 +6,7 @@ sends the newest values only when the last answer has come.
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Mapping
 from contextlib import nullcontext
@@ -13,11 +14,10 @@ from typing import Any
 
 import msgspec
 
-from potto.applications.integral_pictures import integral_svg, remarks, told
+from potto.applications.integral_pictures import integral_svg, remarks, told, typeset
 from potto.applications.integral_scenes import IntegralScene, Shot
 from potto.applications.integral_views import FRAME
 from potto.calculus.explanation.layout import DerivativeText
-from potto.checking.facts import show_equation
 from potto.diagnostics import PottoError
 from potto.evaluating.world import World
 from potto.ide.display.scenes import scenes
@@ -25,9 +25,10 @@ from potto.ide.display.views import viewed
 from potto.ide.hover.derivatives import derivative_text
 from potto.modules import chunk_start
 from potto.projects.settings import settings
-from potto.syntax.typesetting import mathml, unicode
+from potto.syntax.typesetting import mathml
 
 QUICK = 1e-4  # the accuracy of what is seen while a slider is dragged: less than a pixel
+UNSEEN = 0.25  # seconds that files may have changed unseen while a slider is dragged: there may be thousands
 MOST = 400  # characters of a formula that is shown
 
 
@@ -41,10 +42,11 @@ class Answers:
         self.world, self.file, self.name, self.given, self.wrt = world, file, name, dict(given or {}), wrt
         self._scenes: dict[tuple[str, frozenset[tuple[str, str]]], IntegralScene] = {}
         self._revision = -1
+        self._refreshed = -math.inf
 
     def answer(self, path: str, asked: Mapping[str, Any]) -> dict[str, Any] | None:
         """What goes back as JSON; None for a question that there is not. An error of the program is an `error`."""
-        self.world.refresh()
+        self._refresh(bool(asked.get("quick")))
         if self._revision != self.world.db.revision:
             self._scenes.clear()
             self._revision = self.world.db.revision
@@ -64,6 +66,13 @@ class Answers:
         except (KeyError, TypeError, ValueError):
             return {"error": "the question is not one of this page"}
         return None
+
+    def _refresh(self, quick: bool) -> None:
+        """Look at the disk again."""
+        now = time.monotonic()
+        if not quick or now - self._refreshed > UNSEEN:
+            self.world.refresh()
+            self._refreshed = now
 
     def _scene(self, asked: Mapping[str, Any]) -> IntegralScene:
         """What is asked for: a function, and what its parameters that are functions are given, where that is chosen."""
@@ -140,7 +149,7 @@ def _parts(found: DerivativeText) -> list[tuple[int, str, str]]:
 def _surfaces(shot: Shot) -> list[dict[str, Any]]:
     return [
         {
-            "equation": show_equation(unicode)(s.equation),
+            "equation": typeset(s.equation),
             "condition": s.condition,
             "inside": bool(s.lines),
             "gain": s.gain,

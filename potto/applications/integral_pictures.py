@@ -1,9 +1,9 @@
 """An integral as SVG: the domain and its cells, surfaces, arrows for what the boundary gains, and the numbers.
 
-Owns `integral_svg`, `words` and `told`. Every surface is a group with its number as `data-surface` and the equation of
-its condition as `data-equation`, so that a page can tell which one was clicked. Arrows point to where a place moves;
-they are as long as what it gains is great, blue where the integral gains and red where it loses. Colours are those of
-classes, which a page may set; a picture that stands alone brings its own.
+Owns `integral_svg`, `words`, `told` and `typeset`. Every surface is a group with its number as `data-surface` and the
+equation of its condition as `data-equation`, so that a page can tell which one was clicked. Arrows point to where a
+place moves; they are as long as what it gains is great, blue where the integral gains and red where it loses. Colours
+are those of classes, which a page may set; a picture that stands alone brings its own.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import base64
 import html
 import math
 from collections.abc import Iterable, Sequence
+from functools import lru_cache
 
 import numpy as np
 
@@ -32,6 +33,8 @@ CELLS = ((222, 233, 247), (253, 236, 214), (226, 243, 224), (244, 226, 241), (25
 DARK = ((44, 62, 88), (84, 62, 38), (44, 74, 50), (76, 50, 76), (80, 76, 40), (66, 66, 66))
 WAITING = "…"
 DARKER, LIGHTER = 0.35, 0.75  # how much the size of the integrand changes a colour
+
+typeset = lru_cache(maxsize=256)(show_equation(unicode))  # of surfaces, which stay what they are while something moves
 
 Said = tuple[str, str]  # a line, and its class
 
@@ -100,7 +103,7 @@ def words(view: IntegralView, numbers: IntegralNumbers | None, title: str, wrt: 
     if numbers is not None and not numbers.converged:
         found.append(("not as accurate as was asked", "loss"))
     for surface in view.surfaces:
-        equation = show_equation(unicode)(surface.equation)
+        equation = typeset(surface.equation)
         found.append((equation if surface.lines else f"{equation}: not in the domain", "edge"))
     return [*found, *((text, "quiet") for text in remarks(view))]
 

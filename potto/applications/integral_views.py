@@ -33,7 +33,7 @@ ARROWS = 24  # of one surface, at most
 NODES = 1500
 STEP = 1e-3  # of the parameter, or of 1 where that is more
 TINY = 1e-13
-PARTS, CLOSER = 64, 10  # a root is looked for in so many parts, so often: its ends are neighbours then
+PARTS, CLOSER = 1024, 5  # a root is looked for in so many parts, so often: its ends are neighbours then
 
 _NAME = re.compile(r"[^\W\d]\w*(?:\.\w+)*")
 Compile = Callable[[Lam], TermFunction]
@@ -236,14 +236,11 @@ class Viewer:
     # Numbers
 
     def _numbers(self, term: Lam, at: Mapping[str, Any]) -> Array:
+        given = [at[name] for name in self.region.names]
         plain = _constant(term)
-        if plain is not None:
-            return np.full(np.broadcast_shapes(*(np.shape(at[name]) for name in self.region.names)), plain)
-        call = self._compiled(term)
-        arguments = np.broadcast_arrays(*(np.asarray(at[name], dtype=float) for name in self.region.names))
-        answer = call(*(a if a.ndim else float(a) for a in arguments))
-        found: Array = np.broadcast_to(np.asarray(answer.value, dtype=float), arguments[0].shape)
-        return found
+        found = self._compiled(term).values(*given) if plain is None else plain
+        numbers: Array = np.broadcast_to(found, np.broadcast_shapes(*map(np.shape, given)))
+        return numbers
 
     def _number(self, term: Lam, at: Mapping[str, Any]) -> float:
         return float(self._numbers(term, at))

@@ -281,3 +281,16 @@ def test_of_a_definition_that_cannot_be_read_it_is_said_why() -> None:
         world = World()
         with pytest.raises(PottoError, match=says):
             IntegralScene(world, world.put("program.po", broken + "\n"), "f", {})
+
+
+def test_a_root_is_exact_also_while_something_is_dragged() -> None:
+    """x^3 = t at the cube root of t, which gains (t^(1/3) + 1/2)/(3*t^(2/3)) there, both to a few roundings."""
+    world = World()
+    program = "def cube(t) integral [0, 1] [x^3 < t]*(x + 1/2) d(x)"
+    scene = IntegralScene(world, world.put("cube.po", program), "cube", {})
+    for t in (0.1, 0.37, 0.9):
+        root = t ** (1 / 3)
+        for quick in (True, False):
+            (surface,) = scene.look({"t": t}, "t", quick=quick).view.surfaces
+            assert abs(surface.arrows[0].at[0] - root) <= 4e-16
+            assert surface.gain == pytest.approx((root + 0.5) / (3 * root**2), rel=4e-15, abs=0)

@@ -17,6 +17,7 @@ from typing import Any
 
 import pytest
 
+from potto.applications import integral_answers, integral_scenes
 from potto.applications.integral_answers import Answers
 from potto.cli.view_page import Answering, serve
 from potto.evaluating.world import World
@@ -198,3 +199,32 @@ def test_a_person_with_a_browser(address: str, tmp_path: Path) -> None:
     assert seen["shade"] == "ramp" and float(seen["shaded"][0].split()[0]) == pytest.approx(0.125, rel=1e-9)
     assert float(seen["reshaded"][0].split()[0]) == pytest.approx(1.5, rel=1e-9)  # of 3 from 0 to 0.5
     assert "shade = \\(x) . 3" in seen["caption"]
+
+
+def test_a_drag_looks_at_the_disk_now_and_then_and_its_end_shows_what_was_saved(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Over [0, t]: 1 leads to t, and 2 to 2*t."""
+    program = "def f(t) integral [0, 1] [x < t]*{} d(x)\n"
+    (tmp_path / "f.po").write_text(program.format(1))
+    world = World([tmp_path])
+    looks: list[int] = []
+    refresh = world.refresh
+    monkeypatch.setattr(world, "refresh", lambda: looks.append(1) or refresh())
+    monkeypatch.setattr(integral_scenes, "FRAME", 1e9)  # numbers come at each place, whatever else runs
+    monkeypatch.setattr(integral_answers, "UNSEEN", 1e9)
+    answers = Answers(world, world.key(tmp_path / "f.po"))
+
+    def value(t: float, quick: bool) -> float:
+        found = answers.answer("/look", {"name": "f", "values": {"t": t}, "wrt": "t", "which": 0, "quick": quick}) or {}
+        return float(found["numbers"]["value"])
+
+    assert value(0.5, False) == pytest.approx(0.5)
+    (tmp_path / "f.po").write_text(program.format("2.0"))  # of another length, whatever the clock of the disk says
+    for place in range(10):
+        assert value(0.5 + place / 100, True) == pytest.approx(0.5 + place / 100, abs=1e-3)
+    assert len(looks) == 1
+    assert value(0.5, False) == pytest.approx(1.0)
+    monkeypatch.setattr(integral_answers, "UNSEEN", 0.0)
+    (tmp_path / "f.po").write_text(program.format("3.00"))
+    assert value(0.5, True) == pytest.approx(1.5, abs=1e-3)
