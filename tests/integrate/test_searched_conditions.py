@@ -179,13 +179,56 @@ def test_a_number_may_have_a_name(text: str) -> None:
     assert found.tangent == pytest.approx(float(-(root**2) / (mp.cos(root) + root)), rel=1e-12)
 
 
-def test_a_number_that_is_an_integral_is_to_be_a_parameter() -> None:
-    text = "big = integral [0, 1] x d(x)\ndef f(t) integral [0, 1] [sin(x) + x^2*t < big] d(x)"
-    with pytest.warns(UserWarning, match="a definition has an error"):
-        module = potto.compile(text)
-    with pytest.raises(potto.PottoError, match="no inverse was found") as caught:
-        module.f(0.5)
-    assert caught.value.diagnostics[0].help == "make `big` a parameter, and give the definition as its argument"
+_COMPARED = {
+    "a name": "k = integral [0, 1] y*exp(y/2) d(y)\ndef f(t) integral [0, 1] [sin(x) + x^2*t < k] d(x)",
+    "a call": "def f(t) integral [0, 1] [sin(x) + x^2*t < k(t)] d(x)",
+    "written in": "def f(t) integral [0, 1] [sin(x) + x^2*t < (integral [0, 1] y*exp(t*y) d(y))] d(x)",
+    "in arithmetic": "def f(t) integral [0, 1] [sin(x) + x^2*t - k(t)/2 < k(t)/2] d(x)",
+    "behind a call": "def below(x, t) [sin(x) + x^2*t < k(t)]\ndef f(t) integral [0, 1] below(x, t) d(x)",
+    "a parameter": "def g(t, q) integral [0, 1] [sin(x) + x^2*t < q(t)] d(x)\ndef f(t) g(t, k)",
+    "a delta": "def f(t) integral [0, 1] delta(k(t) - sin(x) - x^2*t)*x d(x)",
+    "guarded": "def f(t) integral [0, 1] (if t > 0 then [sin(x) + x^2*t < k(t)] else [x < 1/2]) d(x)",
+}
+
+
+def _level(t: Any) -> Any:
+    """The integral of y exp(t y) over y in [0, 1]."""
+    return (mp.exp(t) * (t - 1) + 1) / t**2
+
+
+@pytest.mark.parametrize("how", _COMPARED)
+def test_what_a_condition_compares_with_may_be_an_integral(how: str) -> None:
+    """The root of the surface, or under a delta x over the surface's slope there; within 1e-12, and its derivatives."""
+    text = f"def k(t) integral [0, 1] y*exp(t*y) d(y)\n{_COMPARED[how]}" if how != "a name" else _COMPARED[how]
+    text += "\ndf = deriv(f)\ndef rate(t) snd(df((t, 1)))"
+
+    def exact(t: Any) -> Any:
+        level = _level(mp.mpf("0.5") if how == "a name" else t)
+        root = mp.findroot(lambda x: mp.sin(x) + x**2 * t - level, 0.5)
+        return root / (mp.cos(root) + 2 * t * root) if how == "a delta" else root
+
+    module = potto.compile(text)
+    one, two = potto.grad(module.f)(0.5), potto.grad(module.rate)(0.5)
+    with mp.workdps(40):
+        rates = [mp.diff(exact, mp.mpf("0.5"), n) for n in range(3)]
+    assert one.converged and two.converged
+    for found, error, rate in (
+        (one.value, one.error, rates[0]), (one.tangent, one.tangent_error, rates[1]),
+        (two.value, two.error, rates[1]), (two.tangent, two.tangent_error, rates[2]),
+    ):  # fmt: skip
+        assert abs(found - rate) <= error + 64 * EPS * abs(rate)
+        assert found == pytest.approx(float(rate), rel=1e-12)
+    many = module.f([0.25, 0.5, 0.75])
+    assert all(abs(v - exact(mp.mpf(t))) < 1e-12 for v, t in zip(many.value, (0.25, 0.5, 0.75), strict=True))
+
+
+def test_what_is_compared_is_found_only_where_it_is_asked_for() -> None:
+    """The integral of 1/y^2 over [0, 1] is infinite, and nothing depends on it at t = 2. Within 4 ulp."""
+    f = potto.compile(
+        "def k(t) integral [0, 1] 1/y^t d(y)\n"
+        "def f(t) integral [0, 1] (if t < 1 then [sin(x) + x^2/2 < k(t) - 1] else [x < 1/2]) d(x)"
+    ).f
+    assert abs(f(2).value - 0.5) <= 4 * EPS and f(2).converged
 
 
 @pytest.mark.parametrize("t", [2.0, 3.0])

@@ -18,12 +18,13 @@ from potto.calculus.algebra.affine import determinant
 from potto.calculus.algebra.ranges import Box, ranges
 from potto.calculus.algebra.rational_form import is_zero
 from potto.calculus.differentiation.derivative import NotSmooth, partial
+from potto.calculus.inlining.reads import with_numbers_named
 from potto.calculus.solving.enclosable import searchable
 from potto.calculus.solving.inverse_map import Failure, InverseMap, dependence, invert, jacobian, listed
 from potto.calculus.solving.solve import Sections, sections
 from potto.calculus.surfaces.nested_brackets import in_loops, pieces
 from potto.core.printer import LONGEST, abridged, format_term
-from potto.core.terms import App, Branch, Global, If, Integral, Prim, Term, postorder, var
+from potto.core.terms import Branch, If, Integral, Prim, Term, postorder, var
 from potto.diagnostics import Kind, declare
 from potto.primitives import PRIMITIVES
 
@@ -141,7 +142,8 @@ def _judged(
             return no_inverse(surface, mine, reasons, role)
         if isinstance(inverse, InverseMap):
             return Verdict(mine[-1], (), inverse.determinant, None, inverse)
-    found_by_search = next((name for name in reversed(mine) if searchable(surface, name)), None)
+    enclosed = with_numbers_named(surface, variables)
+    found_by_search = next((name for name in reversed(mine) if searchable(enclosed, name)), None)
     if role != "map" and found_by_search is not None:
         return Verdict(found_by_search, (), None, None, searched=(surface,))
     return no_inverse(surface, mine, reasons, role, found_by_search is not None)
@@ -233,16 +235,12 @@ def no_inverse(
     surface: Term, variables: Sequence[str], reasons: Sequence[str], role: Role = "bracket", searchable: bool = False
 ) -> ConditionProblem:
     help = _ADVICE[role if searchable else "bracket"].format(format_term(surface))  # it is to be written
-    inner = next((node for node in postorder(surface) if isinstance(node, Integral)), None)
-    if inner is not None:  # neither can be done: an inverse is a formula, and is verified as one
+    integrals = [node for node in postorder(surface) if isinstance(node, Integral)]
+    if integrals:  # neither can be done: an inverse is a formula, and is verified as one
+        inner = next((node for node in integrals if not node.free.isdisjoint(variables)), integrals[0])
         reasons = (*reasons, "integrals are evaluated numerically, and the surface must be known beforehand")
         what = " or ".join(f"`{name}`" for name in variables if name in inner.free)
         help = f"write `{format_term(inner)}` as a formula in {what}" if what else help
-    called = {node.function for node in postorder(surface) if isinstance(node, App)}
-    named = next((node for node in postorder(surface) if isinstance(node, Global) and node not in called), None)
-    if named is not None and role == "bracket":  # what is arithmetic, or an array, is not seen as a name here
-        reasons = (*reasons, f"`{named.name}` is found numerically, and the surface must be known beforehand")
-        help = f"make `{named.name}` a parameter, and give the definition as its argument"
     return ConditionProblem(
         NO_INVERSE,
         f"no inverse was found for `{abridged(surface)}` in {listed(variables, 'or')}",

@@ -1,10 +1,12 @@
-"""What integrands and steps of folds read of arrays at plain places, found once beside the integral or the fold.
+"""What is found once beside an integral or a fold: what integrands and steps read of arrays at plain places, and
+integrals that conditions compare something with.
 
-Owns `hoisted` and `beside`.
+Owns `hoisted`, `beside`, `compared` and `with_numbers_named`.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Iterator
 from functools import lru_cache
 
 from msgspec import Struct
@@ -14,10 +16,13 @@ from potto.core.terms import (
     ZERO,
     App,
     Branch,
+    Delta,
+    Global,
     Holding,
     If,
     Index,
     Integral,
+    Prim,
     Proj,
     Sum,
     Term,
@@ -55,9 +60,47 @@ def hoisted(term: Integral) -> tuple[Integral, tuple[Access, ...]]:
 def beside(term: Term, varying: frozenset[str]) -> tuple[Term, tuple[Access, ...]]:
     """A term with what it reads of arrays under names of its own, where these places hold nothing that varies, and
     nothing that is bound in it."""
-    inside, arrays = varying | frozenset(bound(term)), Holding(*ARRAYS)
+    inside, reads = varying | frozenset(bound(term)), (*ARRAYS, Proj, Sum, If, Branch)
+    return _named(term, inside, Holding(*ARRAYS), lambda node: isinstance(node, reads))
+
+
+def compared(term: Term, integrals: Callable[[Term], bool]) -> tuple[Term, tuple[Access, ...]]:
+    """An integral with the numbers under names of their own that its conditions compare something with, and that other
+    integrals give: a surface has to be enclosed, or solved for a variable.
+
+    integrals: whether a term leads to any.
+    """
+    inside = frozenset(bound(term))
+    numbers = {
+        part
+        for node in postorder(term)
+        if isinstance(node, Branch | Delta) and integrals(node)
+        for coordinate in node.coordinates
+        if not inside.isdisjoint(coordinate.free)
+        for part in _numbers(coordinate)
+    }
+    return _named(term, inside, integrals, numbers.__contains__) if numbers else (term, ())
+
+
+def with_numbers_named(surface: Term, variables: Iterable[str]) -> Term:
+    """A condition's coordinate as its integral meets it: what does not vary with the variables of integration, and is
+    found by calls or integrals, has a name."""
+    inside = frozenset(variables).union(bound(surface))
+    return _named(surface, inside, Holding(Integral, App, Global), set(_numbers(surface)).__contains__)[0]
+
+
+def _numbers(coordinate: Term) -> Iterator[Term]:
+    """A coordinate of a condition, and the numbers that it is computed from."""
+    return iter(postorder(coordinate, below=lambda node: children(node) if isinstance(node, Prim) else ()))
+
+
+def _named(
+    term: Term, inside: frozenset[str], wanted: Callable[[Term], bool], takes: Callable[[Term], bool]
+) -> tuple[Term, tuple[Access, ...]]:
+    """A term with the largest parts under names of their own that are taken and don't vary with what is inside; wanted:
+    whether there can be such below."""
     guards: dict[Term, list[tuple[Term, ...]]] = {}
-    _gather(term, (), inside, arrays, guards)
+    _gather(term, (), inside, wanted, takes, guards)
     called = {node.function for node in postorder(term) if isinstance(node, App)}
     names, taken = dict[Term, Term](), set(term.free | inside)
     accesses: list[Access] = []
@@ -73,22 +116,21 @@ def beside(term: Term, varying: frozenset[str]) -> tuple[Term, tuple[Access, ...
 
 
 def _gather(
-    root: Term, guard: tuple[Term, ...], inside: frozenset[str], arrays: Holding,
-    found: dict[Term, list[tuple[Term, ...]]],
+    root: Term, guard: tuple[Term, ...], inside: frozenset[str], wanted: Callable[[Term], bool],
+    takes: Callable[[Term], bool], found: dict[Term, list[tuple[Term, ...]]],
 ) -> None:  # fmt: skip
-    """Note what is read under these conditions. Recursion only at plain conditionals."""
+    """Note what is taken under these conditions. Recursion only at plain conditionals."""
     waiting, seen = [root], set[Term]()
     while waiting:
         node = waiting.pop()
-        if node in seen or not arrays(node):
+        if node in seen or not wanted(node):
             continue
         seen.add(node)
-        plain = inside.isdisjoint(node.free)
-        if plain and isinstance(node, (*ARRAYS, Proj, Sum, If, Branch)):
+        if inside.isdisjoint(node.free) and takes(node):
             found.setdefault(node, []).append(guard)
         elif isinstance(node, If | Branch) and (condition := _condition(node, inside)) is not None:
-            _gather(node.then, (*guard, condition), inside, arrays, found)
-            _gather(node.orelse, (*guard, prim("not", condition)), inside, arrays, found)
+            _gather(node.then, (*guard, condition), inside, wanted, takes, found)
+            _gather(node.orelse, (*guard, prim("not", condition)), inside, wanted, takes, found)
             waiting += children(node)[:-2]
         else:
             waiting += children(node)
@@ -119,8 +161,10 @@ def _guarded(node: Term, ways: list[tuple[Term, ...]], called: bool) -> Term:
 
 
 def _stem(node: Term) -> str:
-    """What a read is called: after the array."""
+    """What is found beside is called: after the array, or the name that it has."""
     while not isinstance(node, Var):
+        if isinstance(node, Global):
+            return node.name
         below = children(node)
         if not below:
             return "data"

@@ -52,6 +52,7 @@ from potto.runtime.evaluation.machine import Machine
 from potto.runtime.integration.driver import integrate
 from potto.runtime.integration.methods.choices import many, preferred, to_be_seen
 from potto.runtime.integration.preparation.arrays import met
+from potto.runtime.integration.preparation.compared import compares
 from potto.runtime.integration.preparation.prepared import filled, placed, prepared
 from potto.runtime.integration.problem import Mixed, Problem, linked
 from potto.runtime.integration.settled_calls import Batches, SettledCall, SweptCall, unused
@@ -204,7 +205,7 @@ class Direct(Struct, frozen=True):
         reach = machine.linker.reach
         try:
             term, full = filled(self.term, env, reach)
-            if full is not env or met(term, env, reach):
+            if full is not env or met(term, env, reach) or compares(term, env, reach):
                 return None
             again = machine.directions > 0
             if placed(term, again, reach) is not term or prepared(term, reach) is not term:

@@ -32,6 +32,7 @@ from potto.runtime.integration.derivatives.rims import note_rims
 from potto.runtime.integration.methods.choices import SAMPLED
 from potto.runtime.integration.methods.members import Whole
 from potto.runtime.integration.preparation.arrays import Differ, Read, as_written, in_numbers, met, without_arrays
+from potto.runtime.integration.preparation.compared import compares, with_compared
 from potto.runtime.integration.preparation.prepared import filled, held, placed, prepared
 from potto.runtime.integration.preparation.taken_apart import together
 from potto.runtime.integration.problem import Mixed, Problem, linked
@@ -43,14 +44,16 @@ def integral(machine: Machine, term: Integral, env: dict[str, Value]) -> Value:
     found beside it, and it is solved in as few directions as there have to be."""
     linker, read = machine.linker, Read()
     term, env = filled(term, env, linker.reach)
+    if compares(term, env, linker.reach):
+        term, env, read = with_compared(machine, term, env)
     if met(term, env, linker.reach):
         try:
-            ready, env, read = without_arrays(machine, term, env)
+            ready, env, reads = without_arrays(machine, term, env)
         except Differ as differ:
             return _by_length(machine, term, env, differ.ends)
         if not isinstance(ready, Integral):
             return together(machine, ready, env)
-        term = ready
+        term, read = ready, read | reads
     different = next((each for name in term.free for each in choices(env[name])), None)
     if different is not None:
         return _by_choice(machine, term, env, different)

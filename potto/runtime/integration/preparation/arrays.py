@@ -1,6 +1,6 @@
 """Arrays end where an integral begins: what it reads of them is found beside it, and it integrates numbers.
 
-Owns `without_arrays`, `in_numbers`, `in_places` and `as_written`.
+Owns `without_arrays`, `found_beside`, `in_numbers`, `in_places` and `as_written`.
 """
 
 from __future__ import annotations
@@ -84,7 +84,7 @@ def without_arrays(machine: Machine, term: Integral, env: Env) -> tuple[Term, En
             )]) from None  # fmt: skip
     with making:
         term, accesses = hoisted(term)
-    return _read(machine, term, accesses, env)
+    return found_beside(machine, term, accesses, env)
 
 
 @kept
@@ -132,7 +132,7 @@ def as_written(record: Record, known: tuple[int, frozenset[Term]], read: Read) -
         edges[place] = replace(edges[place], cause=replace(cause, surface=surface, other=other))
 
 
-def _read(machine: Machine, term: Integral, accesses: tuple[Access, ...], env: Env) -> tuple[Term, Env, Read]:
+def found_beside(machine: Machine, term: Term, accesses: tuple[Access, ...], env: Env) -> tuple[Term, Env, Read]:
     """The integral, with the values of what it reads; tuples in their parts."""
     read: Read = {}
     here = {name: env[name] for name in term.free if name in env}
