@@ -65,6 +65,7 @@ class DerivativeFacts(Struct, frozen=True):
     derivative: str = ""  # the whole of it, deltas integrated out
     where: tuple[str, ...] = ()  # what the parameters of measures must be
     tangents: tuple[str, ...] = ()  # the names of tangents in these formulas
+    divisors: tuple[str, ...] = ()  # what must not be 0 for the whole to have a value
 
     @property
     def text(self) -> str:
@@ -87,6 +88,7 @@ class DerivativeFacts(Struct, frozen=True):
         if self.derivative and said != [self.derivative]:
             long = f"left out, {len(self.derivative):,} characters long: --json has it"
             lines += ["", *_part("whole", (show(self.derivative) if len(self.derivative) <= LONG else long,))]
+        lines += _part("for", tuple([show(f"{divisor} != 0") for divisor in self.divisors]))
         surfaces = tuple(map(show_equation(show), self.surfaces)) or ("none",)
         lines += ["", *_part("surfaces", surfaces), *_part("where", tuple(map(show, self.where)))]
         return "\n".join(lines)
@@ -166,6 +168,7 @@ def derivative_facts(db: Database, file: str, name: str) -> DerivativeFacts | No
         found.tangent,
         found.conditions,
         tuple(sorted(found.tangents)),
+        found.divisors,
     )
 
 

@@ -28,6 +28,9 @@ def derivative_latex(found: DerivativeText, name: str) -> str | None:
     head = r"\partial " + str(latex(name))
     sides = [_of_integral(found.integrals[0], tangents)] if found.alone and len(found.integrals) == 1 else []
     whole = _readable(found.tangent, tangents) if found.tangent else None
+    if whole is not None and found.divisors:
+        apart = [str(latex(f"{divisor} != 0", tangents)) for divisor in found.divisors]
+        whole += rf" \quad \text{{for }} {', '.join(apart)}"
     shown = list(dict.fromkeys(side for side in (*sides, whole) if side is not None))
     if not shown:
         return None

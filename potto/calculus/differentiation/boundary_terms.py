@@ -19,6 +19,7 @@ from potto.calculus.algebra.rational_form import is_zero
 from potto.calculus.differentiation.between import between, scaled
 from potto.calculus.differentiation.derivative import partial, total, vanishes, zero_like
 from potto.calculus.differentiation.on_all_sides import is_zero_on_all_sides
+from potto.calculus.differentiation.root_names import NamedRoot
 from potto.calculus.solving.pivots import NoClosedForm as NoClosedForm
 from potto.calculus.solving.pivots import Roots, SurfaceRoot, chosen, conjunction, pivots
 from potto.calculus.solving.solve import factors
@@ -51,6 +52,7 @@ from potto.core.terms import (
     children,
     const,
     delta,
+    div,
     fresh,
     if_,
     integral,
@@ -69,11 +71,15 @@ from potto.core.terms import (
 )
 
 Rate = Callable[[Term], Term]
+Name = Callable[[Term, SurfaceRoot], NamedRoot | None]  # of a root of a surface, if it has one
 
 
-def at_surfaces(node: Integral, moving: frozenset[str], rate: Rate, wanted: Roots = Roots.STEADY) -> list[Term]:
+def at_surfaces(
+    node: Integral, moving: frozenset[str], rate: Rate, wanted: Roots = Roots.STEADY, name: Name | None = None
+) -> list[Term]:
     """The boundary terms of an integral, one for each root of each surface that moves; over a level set, as an integral
-    of a delta, where roots have no closed form that is `wanted`."""
+    of a delta, where roots have no closed form that is `wanted`. name: what roots are called where not by their place.
+    """
     branches = branches_of(node.body, node.variables)
     surfaces: dict[Term, list[Branch]] = {}
     for item in branches:
@@ -84,7 +90,7 @@ def at_surfaces(node: Integral, moving: frozenset[str], rate: Rate, wanted: Root
     met: list[SurfaceRoot] = []
     for surface, members in surfaces.items():
         try:
-            terms += _at_surface(node, surface, members, branches, met, rate, wanted)
+            terms += _at_surface(node, surface, members, branches, met, rate, wanted, name)
         except NoClosedForm:
             terms += _over_level_set(node, surface, members, rate)
     return [term for term in terms if not vanishes(term)]
@@ -92,7 +98,7 @@ def at_surfaces(node: Integral, moving: frozenset[str], rate: Rate, wanted: Root
 
 def _at_surface(
     node: Integral, surface: Term, members: Sequence[Branch], branches: list[Branch], met: list[SurfaceRoot],
-    rate: Rate, wanted: Roots,
+    rate: Rate, wanted: Roots, name: Name | None,
 ) -> list[Term]:  # fmt: skip
     """The boundary terms of a surface at its roots, but those already met; under loops each instance of it has a pivot
     of its own. Raises NoClosedForm."""
@@ -105,10 +111,21 @@ def _at_surface(
         where = earlier if pivot.condition is None else [*earlier, pivot.condition]
         each = where if any(loop.variable in term.free for loop in loops for term in where) else []
         gains: list[Term] = []
-        for root in new:
-            flips = flipping(branches, root.variable, root.at, members)
+        calls = [] if name is None or loops or where or zero is not ZERO else [name(surface, root) for root in new]
+        exists = {root.exists for root in calls if root is not None}
+        alike = len(exists) == 1 and None not in calls
+        for place, root in enumerate(new):
+            flips: Flips = flipping(branches, root.variable, root.at, members)
             exactly = wanted is Roots.READ  # where numbers are rounded, that a fall is 0 shows in exact ones alone
-            gains += _at_root(node, flips, root, rate, loops, each, exactly)
+            called = calls[place] if alike else None
+            speed = rate(root.at)
+            if called is not None:
+                flips = [called.told(flip) for flip in flips]
+                speed = neg(div(substitute(rate(surface), {root.variable: called.at}), called.rise))
+            gains += _at_root(node, flips, root, speed, called, loops, each, exactly)
+        if alike and gains:
+            (positive,) = exists
+            gains = [branch((positive,), True, div(add(*gains), prim("sqrt", positive)), ZERO)]
         met += new
         if each:
             apart += gains
@@ -151,19 +168,21 @@ def _guards(at: Term) -> list[Term]:
 
 
 def _at_root(
-    node: Integral, flips: Flips, root: SurfaceRoot, rate: Rate, sums: list[Loop], where: Sequence[Term], exactly: bool
-) -> Iterator[Term]:
+    node: Integral, flips: Flips, root: SurfaceRoot, speed: Term, called: NamedRoot | None, sums: list[Loop],
+    where: Sequence[Term], exactly: bool,
+) -> Iterator[Term]:  # fmt: skip
     """What is gained at a root, for those instances of it for which some conditions hold."""
-    speed = rate(root.at)
     if speed is ZERO:
         return
     instances = _instances(node.body, sums, root.at.free)
-    fall = substitute(_fall(node.body, flips, sums, instances, box_of(node)), {root.variable: root.at})
+    falling = _fall(node.body, flips, sums, instances, box_of(node))
+    fall = substitute(falling, {root.variable: root.at})
     if vanishes(fall) or (exactly and is_zero_on_all_sides(fall)):
         return
-    gain = scaled(fall, speed)
+    at = root.at if called is None else called.at
+    gain = scaled(fall if called is None else substitute(falling, {root.variable: at}), speed)
     lo, hi = node.bounds[node.variables.index(root.variable)]
-    gain = between(root.at, lo, hi, gain)
+    gain = between(at, lo, hi, gain)
     if root.index is not None and root.counts is not None:
         gain = sum_(root.index, *root.counts, gain)
     if where:
@@ -171,7 +190,7 @@ def _at_root(
     gain = substitute(gain, instances)
     for old in sums:
         gain = sum_(_name(instances[old.variable]), *_ends(old, instances), gain)
-    yield remaining(node, root.variable, root.at, gain)
+    yield remaining(node, root.variable, at, gain)
 
 
 def _ends(loop: Loop, instances: Mapping[str, Term]) -> tuple[Term, Term]:

@@ -18,6 +18,7 @@ from potto.calculus.differentiation.boundary_terms import at_bounds, at_surfaces
 from potto.calculus.differentiation.deltas import without_deltas, without_leftovers
 from potto.calculus.differentiation.derivative import NotSmooth, partial, total, zero_like
 from potto.calculus.differentiation.level_sets import level_set, steep, transported
+from potto.calculus.differentiation.root_names import RootNames
 from potto.calculus.differentiation.stand_ins import as_values
 from potto.calculus.inlining.choices import calls_of_items, jumps_as_function
 from potto.calculus.inlining.expand import Resolve, expanded, heads_of, known_function
@@ -107,17 +108,18 @@ def split_pairs(value: Term, tangent: Term) -> Term:
 class Differentiator:
     """One derivation. singular: a jump becomes a delta, for an integral is around it; frozen: it stands still.
 
-    wanted: at which roots of surfaces closed forms are.
+    wanted: at which roots of surfaces closed forms are. names: what these roots are called.
     """
 
     def __init__(
         self, resolve: Resolve, singular: bool = False, pairs: Callable[[Term, Term], Term] | None = None,
-        frozen: bool = False, wanted: Roots = Roots.STEADY,
+        frozen: bool = False, wanted: Roots = Roots.STEADY, names: RootNames | None = None,
     ) -> None:  # fmt: skip
         self.resolve = resolve
         self.singular = singular
         self.frozen = frozen
         self.wanted = wanted
+        self.names = names
         self.pair = pairs or split_pairs
 
     def dual(self, term: Term, tangents: Mapping[str, Term]) -> Dual:
@@ -393,5 +395,6 @@ class _Pass:
         inside = rate(plain.body)
         parts: list[Term] = [] if loops.vanishes(inside) else [with_integrand(plain, inside)]
         if not self.owner.frozen:
-            parts += [*at_bounds(plain, rate), *at_surfaces(plain, frozenset(moving), rate, self.owner.wanted)]
+            name = None if self.owner.names is None else self.owner.names.along(moving)
+            parts += [*at_bounds(plain, rate), *at_surfaces(plain, frozenset(moving), rate, self.owner.wanted, name)]
         return plain, total([p for p in parts if p is not ZERO], zero_like(plain.body))

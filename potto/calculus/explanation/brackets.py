@@ -1,9 +1,9 @@
 """Iverson brackets as conditions, in as few and as plain comparisons as they can be told.
 
-Owns `Inequality`, `conditions`, `fewer`, `between`, `plainer`, `sign_where`, `constant`, `bracket`. A root is compared
-by squares or by what it is the root of, factors that do not change a sign are left out, and so is what another
-condition implies. What two conditions hold between numbers stands between them: `-1 < c + x < 0` is c < -x and
-c + x + 1 > 0.
+Owns `Inequality`, `conditions`, `fewer`, `between`, `plainer`, `sign_where`, `constant`, `implies`,
+`bracket`. A root is compared by squares or by what it is the root of, factors that do not change a sign are left out,
+and so is what another condition implies. What two conditions hold between numbers stands between them:
+`-1 < c + x < 0` is c < -x and c + x + 1 > 0.
 """
 
 from __future__ import annotations
@@ -76,8 +76,8 @@ def fewer(known: Iterable[Inequality], box: Box = _ANYWHERE) -> list[Inequality]
         for plain in _plain(item, box):
             if any(_excludes(other, plain) for other in found):
                 return [NEVER]
-            if not any(_implies(other, plain) for other in found):
-                found = [other for other in found if not _implies(plain, other)]
+            if not any(implies(other, plain) for other in found):
+                found = [other for other in found if not implies(plain, other)]
                 found.append(plain)
     return found
 
@@ -174,8 +174,8 @@ def sign_where(known: Sequence[Inequality], inner: Term) -> tuple[int, list[Ineq
     for i, item in enumerate(known):
         for turned, signed in ((1, inner), (-1, neg(inner))):
             positive, strict = Inequality(signed, True), Inequality(item.surface, True)
-            if _implies(strict, positive):
-                own = item if _implies(item, positive) else strict
+            if implies(strict, positive):
+                own = item if implies(item, positive) else strict
                 return turned, [*known[:i], own, *known[i + 1 :]]
     return None
 
@@ -313,7 +313,7 @@ def _excludes(first: Inequality, second: Inequality) -> bool:
     return total < 0 or (total == 0 and (first.strict or second.strict))
 
 
-def _implies(first: Inequality, second: Inequality) -> bool:
+def implies(first: Inequality, second: Inequality) -> bool:
     """Whether the second holds wherever the first does: its surface is the other's and what is never below 0."""
     more = range_of(written_out(sub(second.surface, first.surface)))
     return more.lo > 0 or (more.lo == 0 and (first.strict or not second.strict))

@@ -14,19 +14,21 @@ from msgspec.structs import replace
 from potto.calculus.algebra.ranges import Box, range_of
 from potto.calculus.algebra.rational_form import normal
 from potto.calculus.decomposition.guards import unguarded
-from potto.calculus.differentiation.boundary_terms import at_bounds, at_surfaces, jumps
+from potto.calculus.differentiation.boundary_terms import Name, at_bounds, at_surfaces, jumps
 from potto.calculus.differentiation.deltas import without_deltas
 from potto.calculus.differentiation.derivative import NotSmooth
 from potto.calculus.differentiation.dual import Differentiator
 from potto.calculus.differentiation.higher_order import moving_deltas
 from potto.calculus.differentiation.level_sets import level_set
+from potto.calculus.differentiation.root_names import RootNames, names_in
 from potto.calculus.explanation.continuity import continuous
 from potto.calculus.explanation.decimals import in_decimals
+from potto.calculus.explanation.divisors import divided_by
 from potto.calculus.explanation.fields import fields_of
 from potto.calculus.explanation.layout import DerivativeText, IntegralText, SurfaceText
 from potto.calculus.explanation.plain_names import Each, apart, plainly_indexed, plainly_named
 from potto.calculus.explanation.readable import ReadableParts, readable
-from potto.calculus.explanation.symbols import NoFormula, Rewrite, Words, over_functions
+from potto.calculus.explanation.symbols import Formula, NoFormula, Rewrite, Words, over_functions, shorter
 from potto.calculus.inlining.expand import Resolve, heads_of
 from potto.calculus.solving.pivots import NoClosedForm, Roots, SurfaceRoot, pivots
 from potto.calculus.solving.solve import factors
@@ -132,19 +134,21 @@ def describe(
         params.extend(body.params)
         body = body.body
     body, conditions = unguarded(body)
+    tangents: dict[str, Term] = {p: var(f"d{p}") for p in params}
     words = Words(
         {p: f"d{p}" for p in params if p in heads_of(term)},
         fields,
         frozenset(params) | {f"d{p}" for p in params},
         frozenset(f"d{p}" for p in params),
         ReadableParts(pause),
+        RootNames(tangents, names_in(term)),
     )
-    tangents: dict[str, Term] = {p: var(f"d{p}") for p in params}
     work = Differentiator(resolve, wanted=Roots.READ)
     problems: list[str] = []
-    tangent = ""
+    tangent = Formula("")
     try:
-        tangent = words.text(_tangent(body, work, tangents))
+        named = Differentiator(resolve, wanted=Roots.READ, names=words.roots)
+        (tangent,) = shorter((words.formula(_tangent(body, each, tangents)),) for each in (named, work))
     except NoClosedForm as problem:
         problems.append(f"a boundary is found by numbers: {problem}")
     except NotSmooth as problem:
@@ -158,8 +162,9 @@ def describe(
         _integral(unnested(i), each, work, tangents, words) for i, each in known if isinstance(i, Integral)
     )
     where = tuple(dict.fromkeys(map(words.condition, conditions)))
-    found = DerivativeText(name, type_text, tangent, isinstance(body, Integral), integrals, where)
-    found = replace(found, problems=tuple(problems), smooth=tangent, parameters=tuple(params))
+    found = DerivativeText(name, type_text, tangent.text, isinstance(body, Integral), integrals, where)
+    found = replace(found, problems=tuple(problems), smooth=tangent.text, parameters=tuple(params))
+    found = replace(found, divisors=divided_by(tangent, (body, work.carried_out(body)), conditions, words))
     if not integrals and not problems:
         plain = work.carried_out(body)
         found = replace(found, surfaces=_own_surfaces(plain, tangents))
@@ -242,7 +247,7 @@ def _integral(
     indices = [name for name, _, _ in around]
     names, ranges = (*node.variables, *indices), _ranges(around)
     box = {**ranges, **box_of(node)}
-    deltas, meeting, boundary, bounds = list[str](), list[str](), list[str](), list[str]()
+    deltas, meeting, bounds, boundary = list[str](), list[str](), list[str](), tuple[str, ...]()
     interior, reason = "", ""
     try:
         interior = words.under_integral(rate(node.body), *names, box=box)
@@ -259,9 +264,7 @@ def _integral(
         if plain is not None and level_set(plain) is None:
             bounds = [words.text(t, *indices, box=ranges) for t in at_bounds(plain, rate)]
             bounds = [text for text in bounds if text != "0"]
-            swept = at_surfaces(plain, frozenset(inside), rate, Roots.READ)
-            swept = [t for t in swept if not (isinstance(t, Integral) and level_set(t))]
-            boundary = [words.text(t, *indices, box=ranges) for t in swept]
+            boundary = _swept(plain, inside, rate, words, indices, ranges)
     except (NoClosedForm, NotSmooth, NoFormula) as problem:
         reason = str(problem)
     except PottoError as problem:
@@ -280,6 +283,19 @@ def _integral(
         tuple(meeting),
         ", ".join(f"{name} in {words.plain(lo)}..{words.plain(hi)}" for name, lo, hi in around),
     )
+
+
+def _swept(
+    plain: Integral, tangents: Mapping[str, Term], rate: Rewrite, words: Words, indices: list[str], ranges: Box
+) -> tuple[str, ...]:
+    """The boundary terms of an integral with its deltas integrated out, but those over level sets."""
+
+    def told(name: Name | None) -> tuple[Formula, ...]:
+        terms = at_surfaces(plain, frozenset(tangents), rate, Roots.READ, name)
+        shown = [t for t in terms if not (isinstance(t, Integral) and level_set(t))]
+        return tuple([words.formula(t, *indices, box=ranges) for t in shown])
+
+    return tuple([formula.text for formula in shorter(map(told, (words.roots.along(tangents), None)))])
 
 
 def _ranges(around: Iterable[Each]) -> Box:

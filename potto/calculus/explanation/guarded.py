@@ -10,7 +10,7 @@ import math
 from collections.abc import Iterator
 
 from potto.calculus.algebra.ranges import Box, range_of
-from potto.calculus.explanation.brackets import Inequality, conditions
+from potto.calculus.explanation.brackets import Inequality, conditions, implies
 from potto.core.terms import (
     ONE,
     ZERO,
@@ -30,24 +30,39 @@ from potto.core.terms import (
 from potto.primitives import PRIMITIVES
 
 
-def guarded(term: Term, box: Box | None = None) -> Term:
+def guarded(term: Term, box: Box | None = None, known: tuple[Inequality, ...] = ()) -> Term:
     """The same with choices for those products outside of integrals that have a factor without a value on a stretch
-    where one of their brackets is 0; box: the ranges of indices. That something is divided by 0 at a place is none."""
+    where one of their brackets is 0; box: the ranges of indices, known: what holds around it. That something is divided
+    by 0 at a place is none."""
 
     def change(_: Term, new: Term) -> Term:
         match new:
-            case Branch() if (known := conditions(new)) is not None:
-                return _where(known, ONE, box)
+            case Branch() if (own := conditions(new)) is not None:
+                return _where(own, ONE, box)
+            case Prim(op="mul", args=args) if held := _held(args):
+                inside = (*known, *held)
+                args = tuple(arg if conditions(arg) is not None else guarded(arg, box, inside) for arg in args)
+                return _product(args, ONE, box, known) or mul(*args)
             case Prim(op="mul", args=args):
-                return _product(args, ONE, box) or new
+                return _product(args, ONE, box, known) or new
             case Prim(op="div", args=(top, below)):
-                return _product(_factors(top), below, box) or new
+                return _product(_factors(top), below, box, known) or new
             case Prim(op="neg", args=(Branch(orelse=orelse) as inner,)) if orelse is ZERO and conditions(inner) is None:
                 return _negated(inner)
             case _:
                 return new
 
-    return transform(term, change, below=_outside)
+    return transform(term, change, below=_around)
+
+
+def _held(args: tuple[Term, ...]) -> list[Inequality]:
+    """The conditions that are factors of a product."""
+    return [item for arg in args for item in conditions(arg) or ()]
+
+
+def _around(node: Term) -> tuple[Term, ...]:
+    """What is written anew by itself: not what stands in an integral, nor what a bracket guards."""
+    return () if isinstance(node, Prim) and node.op == "mul" and _held(node.args) else _outside(node)
 
 
 def _outside(node: Term) -> tuple[Term, ...]:
@@ -58,29 +73,30 @@ def _factors(term: Term) -> tuple[Term, ...]:
     return term.args if isinstance(term, Prim) and term.op == "mul" else (term,)
 
 
-def _product(args: tuple[Term, ...], below: Term, box: Box | None) -> Term | None:
+def _product(args: tuple[Term, ...], below: Term, box: Box | None, known: tuple[Inequality, ...]) -> Term | None:
     """A product over what it is divided by as a choice, or as a sum of those; None where it may stand as it is."""
-    held = [known for arg in args if (known := conditions(arg)) is not None]
     rest = [arg for arg in args if conditions(arg) is None]
-    if not any(_gaps(arg, box) for arg in (*rest, below)):
+    if not any(_gaps(arg, box, known) for arg in (*rest, below)):
         return None
-    if held:
-        return _where([item for known in held for item in known], div(mul(*rest), below), box)
+    if held := _held(args):
+        return _where(held, div(mul(*rest), below), box)
     for place, arg in enumerate(rest):
         if isinstance(arg, Prim) and arg.op == "add":
             others = (*rest[:place], *rest[place + 1 :])
-            parts = [_summand(part, others, below, box) for part in arg.args]
+            parts = [_summand(part, others, below, box, known) for part in arg.args]
             return add(*(part for part in parts if part is not None)) if None not in parts else None
     return None
 
 
-def _summand(part: Term, others: tuple[Term, ...], below: Term, box: Box | None) -> Term | None:
+def _summand(
+    part: Term, others: tuple[Term, ...], below: Term, box: Box | None, known: tuple[Inequality, ...]
+) -> Term | None:
     """A summand times what its sum is multiplied by, as a choice."""
     if isinstance(part, Prim) and part.op == "neg":
-        inner = _summand(part.args[0], others, below, box)
+        inner = _summand(part.args[0], others, below, box, known)
         return None if inner is None else _negated(inner)
     factors = _factors(part)
-    return _product((*factors, *others), below, box) if any(conditions(f) is not None for f in factors) else None
+    return _product((*factors, *others), below, box, known) if _held(factors) else None
 
 
 def _where(known: list[Inequality], term: Term, box: Box | None) -> Term:
@@ -98,10 +114,11 @@ def _negated(node: Term) -> Term:
     return neg(node)
 
 
-def _gaps(term: Term, box: Box | None) -> int:
-    """How many parts of a term may have no value on a stretch, as far as its form shows."""
+def _gaps(term: Term, box: Box | None, known: tuple[Inequality, ...] = ()) -> int:
+    """How many parts of a term may have no value on a stretch, as far as its form and what is known show."""
     return sum(
         not (low <= (values := range_of(arg, box)).lo and values.hi <= high)
+        and not (low == 0.0 and high == math.inf and any(implies(item, Inequality(arg, False)) for item in known))
         for node in postorder(term, below=_outside)
         if isinstance(node, Prim)
         for arg, (low, high) in _domains(node)

@@ -60,7 +60,8 @@ class DerivativeText(Struct, frozen=True):
     which `tangent` ends with; smooth: what it is before; continuous: where nothing jumps at a surface that moves.
     conditions: where it has a value. problems: why there is no whole in symbols.
     by: the name of a definition that is this derivative, if it was asked about that.
-    parameters: what it is differentiated by; the tangent of `t` is `dt`.
+    parameters: what it is differentiated by; the tangent of `t` is `dt`. divisors: what `tangent` divides by though the
+    definition does not: where one of them is 0 there may be a derivative of which it has no value.
     """
 
     name: str
@@ -76,10 +77,13 @@ class DerivativeText(Struct, frozen=True):
     deltas: tuple[str, ...] = ()
     parameters: tuple[str, ...] = ()
     continuous: tuple[str, ...] = ()
+    divisors: tuple[str, ...] = ()
 
     @property
     def notes(self) -> tuple[str, ...]:
-        return (*(f"has a value where {condition}" for condition in self.conditions), *self.problems)
+        where = [f"has a value where {condition}" for condition in self.conditions]
+        apart = [f"the formula holds for {divisor} != 0" for divisor in self.divisors]
+        return (*where, *apart, *self.problems)
 
     @property
     def text(self) -> str:

@@ -1,17 +1,19 @@
 """Calls in a derivative as a program writes them, with names that exist.
 
-Owns `Words`, `symbols` and `over_functions`. Derivatives take and give pairs: what moves `f(c)` is the second of one,
-`snd(deriv(f)((c, dc)))`, and of a parameter `shader`, whose derivative is given too, `snd(dshader((x, 0))((c, dc)))`.
+Owns `Words`, `Formula`, `shorter`, `symbols` and `over_functions`. Derivatives take and give pairs: what moves `f(c)`
+is the second of one, `snd(deriv(f)((c, dc)))`, and of a parameter `shader`, whose derivative is given too,
+`snd(dshader((x, 0))((c, dc)))`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 
 from msgspec import Struct
 
 from potto.calculus.algebra.radicals import NAN
 from potto.calculus.algebra.ranges import Box
+from potto.calculus.differentiation.root_names import RootNames
 from potto.calculus.explanation.decimals import in_decimals
 from potto.calculus.explanation.guarded import guarded
 from potto.calculus.explanation.readable import ReadableParts, readable
@@ -56,6 +58,13 @@ class NoFormula(Exception):
     """Internal: nothing that can be written, or that anybody would read. The text says which."""
 
 
+class Formula(Struct, frozen=True):
+    """A formula as text, the term that it is, and those that names in it stand for."""
+
+    text: str
+    terms: tuple[Term, ...] = ()
+
+
 class Words(Struct, frozen=True):
     """How the terms of one derivative are written: the names of its parameters' derivatives, the fields of records."""
 
@@ -64,6 +73,7 @@ class Words(Struct, frozen=True):
     names: frozenset[str]
     tangents: frozenset[str]
     progress: ReadableParts
+    roots: RootNames
 
     def plain(self, term: Term) -> str:
         """A term as it is written, parts of records by their names."""
@@ -79,17 +89,28 @@ class Words(Struct, frozen=True):
                 return self.plain(term)
 
     def text(self, term: Term, *inside: str, box: Box | None = None) -> str:
-        """A formula that is Potto, in the parameters, their tangents and the indices it is `inside` of. Raises
-        NoFormula."""
-        return self._written(guarded(self._readable(term, inside, box), box))
+        """A formula that is Potto, in the parameters, their tangents and the indices it is `inside` of; what it calls
+        roots it says first. Raises NoFormula."""
+        return self.formula(term, *inside, box=box).text
+
+    def formula(self, term: Term, *inside: str, box: Box | None = None) -> Formula:
+        """The same with the terms that it is written from."""
+        found = guarded(self._readable(term, inside, box), box)
+        meant = {name: self._root(term) for name, term in self.roots.used_in(found)}
+        named = "; ".join(f"{name} = {self._written(term)}" for name, term in meant.items())
+        text = f"let {named} in {self._written(found)}" if meant else self._written(found)
+        return Formula(text, (found, *meant.values()))
 
     def under_integral(self, term: Term, *inside: str, box: Box) -> str:
         """The same of what stands under an integral, `inside` of its variables too: its brackets guard it there."""
         return self._written(self._readable(term, inside, box))
 
+    def _root(self, term: Term) -> Term:
+        return readable(simplify(self.fields(term)), frozenset())
+
     def _readable(self, term: Term, inside: tuple[str, ...], box: Box | None) -> Term:
         plain = symbols(without_guards(simplify(transform(term, _by_formula))), self.functions)
-        known = self.names | {"snd", *inside}
+        known = self.names | {"snd", *inside, *self.roots.meanings}
         strangers = {name for name in plain.free - known if name.rstrip("'") != "delta"}  # `delta'`: its derivative
         if strangers:
             raise NoFormula(f"where it jumps depends on `{min(strangers)}`, over which it is summed")
@@ -101,6 +122,14 @@ class Words(Struct, frozen=True):
         if LEFT_OUT in text:
             raise NoFormula("the formula is too long to be shown")
         return text
+
+
+def shorter(told: Iterator[tuple[Formula, ...]]) -> tuple[Formula, ...]:
+    """Of formulas that may call roots by names and the same without, the shorter ones."""
+    named = next(told)
+    if not any(len(formula.terms) > 1 for formula in named):
+        return named
+    return min(named, next(told), key=lambda formulas: sum(len(formula.text) for formula in formulas))
 
 
 def _by_formula(_: Term, node: Term) -> Term:

@@ -5,7 +5,7 @@ Owns `Box` and `boxes`. Names of tangents, `dr`, become what they are, the varia
 
 from __future__ import annotations
 
-from collections.abc import Container
+from collections.abc import Container, Sequence
 
 from msgspec import Struct
 
@@ -84,7 +84,14 @@ class Cases(Struct, frozen=True):
     orelse: Box
 
 
-Box = Word | Row | Fenced | Fraction | Raised | SquareRoot | Big | Cases
+class Where(Struct, frozen=True):
+    """A formula, and equations that say what names in it stand for."""
+
+    body: Box
+    equations: Box
+
+
+Box = Word | Row | Fenced | Fraction | Raised | SquareRoot | Big | Cases | Where
 
 
 def boxes(text: str, tangents: Container[str]) -> Box | None:
@@ -130,6 +137,8 @@ class _Boxes:
                 return self.logic(op, operands)
             case nodes.If(condition=condition, then=then, orelse=orelse):
                 return Cases(self.of(_unbracketed(condition)), self.of(then), self.of(orelse))
+            case nodes.Let(bindings=bindings, body=body):
+                return Where(self.of(body), _separated([self.meaning(binding) for binding in bindings]))
             case nodes.Apply():
                 return self.call(node)
             case nodes.Integral():
@@ -151,7 +160,11 @@ class _Boxes:
             return Row((Word("∂", "sign"), self.name(name[1:])))
         return Word(GREEK.get(name, name) if name != "delta" else name)
 
-    def listed(self, items: tuple[nodes.Expr, ...]) -> Box:
+    def meaning(self, binding: nodes.Binding) -> Box:
+        named = self.listed([nodes.Name(target.span, target.name) for target in binding.targets])
+        return Row((named, Word("=", "sign"), self.of(binding.value)))
+
+    def listed(self, items: Sequence[nodes.Expr]) -> Box:
         return _separated([self.of(item) for item in items])
 
     def enclosed(self, node: nodes.Expr) -> Box:

@@ -1,7 +1,7 @@
 """Long formulas over several lines.
 
-Owns `broken`. A line breaks before the sides of a choice, the signs of a sum or what joins conditions, the outermost
-one or that between the farthest parentheses; where there is no long one, before a factor.
+Owns `broken`. A line breaks beside what names stand for, before the sides of a choice, the signs of a sum or what joins
+conditions, the outermost one or that between the farthest parentheses; where there is no long one, before a factor.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from itertools import pairwise
 _SIGNS = (" + ", " - ", " − ")
 _SIDES = (" then ", " else ")
 _JOINTS = (" and ", " or ", " ∧ ", " ∨ ")
+_LET, _WHERE = "let ", " where "
 _FACTORS = ("·", "*")
 _OUTSIDE = -1
 _SHORT = 40  # characters between parentheses that stay together
@@ -40,8 +41,17 @@ def _broken(line: str, start: int, indent: int, width: int, deep: int) -> list[s
     return [*lines, *_broken(now, begun, indent + 2, width, deep + 1)]
 
 
+def _beside_meanings(text: str) -> int | None:
+    """Where a formula goes on behind what its names stand for, or ends before that."""
+    place = text.find(" in ") + len(" in") if text.startswith(_LET) else text.rfind(_WHERE)
+    return place if place > 0 else None
+
+
 def _places(text: str) -> list[int]:
-    """Where to break: before the sides of a choice, the signs of one sum, conditions that are joined, or factors."""
+    """Where to break: beside what names stand for, before the sides of a choice, the signs of one sum, conditions that
+    are joined, or factors."""
+    if (meanings := _beside_meanings(text)) is not None:
+        return [meanings]
     choices: dict[int, list[int]] = {}
     sums: dict[int, list[int]] = {}
     joints: dict[int, list[int]] = {}

@@ -20,6 +20,7 @@ from potto.syntax.typesetting.boxes import (
     Raised,
     Row,
     SquareRoot,
+    Where,
     Word,
     boxes,
 )
@@ -82,6 +83,8 @@ def _text(box: Box) -> str:
         case Cases(condition=condition, then=then, orelse=orelse):
             rows = rf"{_text(then)} & {_text(condition)} \\ {_text(orelse)} & \text{{else}}"
             return rf"\begin{{cases}} {rows} \end{{cases}}"
+        case Where(body=body, equations=equations):
+            return rf"{_text(body)} \quad \text{{where }} {_text(equations)}"
 
 
 def _above(text: str) -> str:

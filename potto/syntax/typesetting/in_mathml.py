@@ -8,7 +8,19 @@ from __future__ import annotations
 import html
 from collections.abc import Container
 
-from potto.syntax.typesetting.boxes import Big, Box, Cases, Fenced, Fraction, Raised, Row, SquareRoot, Word, boxes
+from potto.syntax.typesetting.boxes import (
+    Big,
+    Box,
+    Cases,
+    Fenced,
+    Fraction,
+    Raised,
+    Row,
+    SquareRoot,
+    Where,
+    Word,
+    boxes,
+)
 
 
 def mathml(text: str, tangents: Container[str] = ()) -> str:
@@ -41,6 +53,8 @@ def _text(box: Box) -> str:
             rows = ((then, f"<mrow><mtext>if </mtext>{_text(condition)}</mrow>"), (orelse, "<mtext>else</mtext>"))
             table = "".join(f"<mtr><mtd>{_text(value)}</mtd><mtd>{when}</mtd></mtr>" for value, when in rows)
             return f'<mrow><mo>{{</mo><mtable columnalign="left">{table}</mtable></mrow>'
+        case Where(body=body, equations=equations):
+            return f"<mrow>{_text(body)}<mtext> where </mtext>{_text(equations)}</mrow>"
 
 
 def _word(word: Word) -> str:

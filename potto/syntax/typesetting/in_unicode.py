@@ -8,7 +8,19 @@ from __future__ import annotations
 import re
 from collections.abc import Container
 
-from potto.syntax.typesetting.boxes import Big, Box, Cases, Fenced, Fraction, Raised, Row, SquareRoot, Word, boxes
+from potto.syntax.typesetting.boxes import (
+    Big,
+    Box,
+    Cases,
+    Fenced,
+    Fraction,
+    Raised,
+    Row,
+    SquareRoot,
+    Where,
+    Word,
+    boxes,
+)
 
 _ABOVE = str.maketrans("0123456789-−", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻⁻")
 _BELOW = str.maketrans("0123456789-−", "₀₁₂₃₄₅₆₇₈₉₋₋")
@@ -45,6 +57,8 @@ def _text(box: Box) -> str:
             return _big(box)
         case Cases(condition=condition, then=then, orelse=orelse):
             return f"if {_text(condition)} then {_text(then)} else {_text(orelse)}"
+        case Where(body=body, equations=equations):
+            return f"{_text(body)} where {_text(equations)}"
 
 
 def _row(items: tuple[Box, ...]) -> str:
