@@ -63,6 +63,32 @@ def test_calls_of_one_function_are_one_batch() -> None:
         assert abs(slope - true) <= error + 4e-16 * size and error <= 1e-12 * size
 
 
+@pytest.mark.parametrize("names", [["x"], ["x", "y", "k"]], ids=["one name", "several"])
+def test_integrals_written_out_are_one_batch(names: list[str]) -> None:
+    """The sum of exp(t/k) - 1 for k from 2, whatever the variables are called."""
+    parts = [f"(integral [0, 1] exp({x})*[{k}*{x} < t] d({x}))" for k, x in zip(range(2, 2 + 2 * N), names * 2 * N)]
+    f = potto.compile(f"def f(t) {' + '.join(parts)}").f
+    value, dual = f(0.9), potto.deriv(f)((0.9, 1.0))
+    exact = math.fsum(math.expm1(0.9 / k) for k in range(2, 2 + 2 * N))
+    slope = math.fsum(math.exp(0.9 / k) / k for k in range(2, 2 + 2 * N))
+    for found in (value, dual):
+        assert abs(found.value - exact) <= found.error + 2 * ROUNDING * exact and found.error <= 1e-12
+        assert found.converged and found.stats["integrals"] == 1
+    assert abs(dual.tangent - slope) <= dual.tangent_error + 2 * ROUNDING * slope and dual.tangent_error <= 1e-12
+
+
+def test_a_name_that_is_bound_in_one_summand_and_free_in_the_next() -> None:
+    """exp(a) - 1 + exp(b) - 1 + ..., where what one is integrated over is a bound of the other."""
+    f = potto.compile("""
+def f(a, b)
+    (integral [0, a] exp(b) d(b)) + (integral [0, b] exp(a) d(a))
+    + (integral [0, a] exp(a) d(a)) + (integral [0, b] exp(b) d(b))
+""").f
+    found = potto.grad(f, ["a", "b"])(0.3, 0.8)
+    assert found.value == pytest.approx(2 * (math.expm1(0.3) + math.expm1(0.8)), rel=1e-14, abs=0)
+    assert found.tangent == pytest.approx((2 * math.exp(0.3), 2 * math.exp(0.8)), rel=1e-14, abs=0)
+
+
 def test_recursions_that_add_up_calls_of_themselves() -> None:
     """Leaves of a tree, each 1 - exp(-a): as many as the depth says."""
     m = potto.compile("""

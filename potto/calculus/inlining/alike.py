@@ -1,12 +1,14 @@
 """Terms that are the same but for their numbers: one term over parameters, and what these are in each.
 
-Owns `alike` and `SameShape`. Numbers and names stand for each other where they are what differs. What is the same in
-all stays as it is, since a closed form may rest on it; so does what decides exponents, recursions, how long a sum is.
+Owns `alike`, `most_alike` and `SameShape`. Numbers and names stand for each other where they are what differs. What is
+the same in all stays as it is, since a closed form may rest on it; so does what decides exponents, recursions, how long
+a sum is. What bound variables are called makes no difference.
 """
 
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
 
 from msgspec import Struct
@@ -75,6 +77,12 @@ def alike(terms: Sequence[Term], kinds: Mapping[str, object], resolve: Resolve) 
     return groups, sorted(alone)
 
 
+def most_alike(terms: Sequence[Term], kinds: Mapping[str, object]) -> int:
+    """How many of the terms are alike at most."""
+    shapes = Counter(found[0] for term in terms if (found := _shape(term, kinds)) is not None)
+    return max(shapes.values(), default=0)
+
+
 def _shape(term: Term, kinds: Mapping[str, object]) -> tuple[object, list[Leaf]] | None:
     """What a term is but for its numbers, as a key, and these; None if it is too large."""
     parts = _parts(term, kinds)
@@ -82,13 +90,16 @@ def _shape(term: Term, kinds: Mapping[str, object]) -> tuple[object, list[Leaf]]
         return None
     key: list[object] = []
     leaves: list[Leaf] = []
+    bound: dict[str, object] = {}
     for node, differs in parts:
+        for name in bound_names(node):
+            bound.setdefault(name, name if name in term.free else len(bound))
         if differs:
             assert isinstance(node, Leaf)
             key.append(kinds.get(node.name) if isinstance(node, Var) else None)
             leaves.append(node)
         else:
-            key.append(_head(node))
+            key.append(_head(node, bound))
     return tuple(key), leaves
 
 
@@ -107,18 +118,20 @@ def _parts(term: Term, kinds: Mapping[str, object]) -> list[tuple[Term, bool]] |
     return parts
 
 
-def _head(node: Term) -> object:
-    """What a part is by itself."""
-    below = len(children(node))
+def _head(node: Term, bound: Mapping[str, object]) -> object:
+    """What a part is by itself, with what stands for each bound name."""
+    below, names = len(children(node)), tuple(bound[name] for name in bound_names(node))
     match node:
         case Prim():
             return node.op, below
         case Branch():
             return Branch, node.strict, below
         case Integral():
-            return Integral, node.variables, tuple(map(len, node.hints))
+            return Integral, names, tuple(map(len, node.hints))
         case Lam() | Sum() | Fold() | Array():
-            return type(node), bound_names(node)
+            return type(node), names
+        case Var():
+            return Var, bound.get(node.name, node.name)
         case Proj():
             return Proj, node.index
         case _:

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from msgspec import Struct
 
+from potto.calculus.inlining.alike import most_alike
 from potto.calculus.inlining.currying import arguments_of, sizes_of, uncurry
 from potto.calculus.surfaces.discontinuities import TooDeep
 from potto.calculus.surfaces.trace import spine
@@ -63,6 +64,9 @@ MOST_FUNCTIONS = 256  # that a call is given one after the other
 # Summands up to which one after the other costs less than all of one integral as a batch: of triangles under pixels 8
 # take 3.1 ms and 4.2, 12 take 5.3 and 3.8.
 MOST_ALONE = 10
+# The same of summands that are alike but for numbers in them: of integrals in one variable, each between cuts that are
+# known, 24 take 0.6 ms and 2.2, 80 take 2.3 and 2.2; where they are made, 3 ms each and 10 for all.
+MOST_WRITTEN_OUT = 64
 
 
 class Direct(Struct, frozen=True):
@@ -330,11 +334,14 @@ def direct(term: Term, linker: Linker) -> Direct | Around | None:
 
 
 def _many_alike(parts: Sequence[Term], integrals: Mapping[Term, Integral]) -> bool:
-    """Whether so many summands are made of one integral that they are better evaluated together."""
+    """Whether so many summands are made of one integral, or are alike, that they are better evaluated together."""
     for part in parts:
         if isinstance(part, Prim) and part.op == "add" and len(part.args) > MOST_ALONE:
             each = ({integrals[node] for node in postorder(arg) if node in integrals} for arg in part.args)
             if max(Counter(term for own in each for term in own).values(), default=0) > MOST_ALONE:
+                return True
+            numbers = dict.fromkeys(part.free)
+            if len(part.args) > MOST_WRITTEN_OUT and most_alike(part.args, numbers) > MOST_WRITTEN_OUT:
                 return True
     return False
 
