@@ -45,6 +45,11 @@ class Coefficient(Struct, frozen=True):
     term: Term
     value: float
 
+    @classmethod
+    def of(cls, term: Term, value: float) -> Coefficient:
+        """A number is itself: 0*t is 0 also while t is not known."""
+        return cls(term, term.value if isinstance(term, Const) else value)
+
 
 NONE = Coefficient(ZERO, 0.0)
 
@@ -156,15 +161,15 @@ def _product(a: Coefficient, b: Coefficient) -> Coefficient:
     if isinstance(y, Const):
         x, y = y, x
     if isinstance(x, Const) and isinstance(y, Prim) and y.op == "mul" and isinstance(y.args[0], Const):
-        return Coefficient(mul(const(x.value * y.args[0].value), *y.args[1:]), value)
-    return Coefficient(mul(x, y), value)
+        return Coefficient.of(mul(const(x.value * y.args[0].value), *y.args[1:]), value)
+    return Coefficient.of(mul(x, y), value)
 
 
 def _quotient(a: Coefficient, b: Coefficient) -> Coefficient:
     value = a.value / b.value if b.value else math.nan
     if isinstance(a.term, Const) and isinstance(b.term, Const) and value == value:
         return Coefficient(const(value), value)
-    return Coefficient(div(a.term, b.term), value)
+    return Coefficient.of(div(a.term, b.term), value)
 
 
 Premises = tuple[Term, ...]
