@@ -2,14 +2,34 @@
 
 from __future__ import annotations
 
+import math
+
 import pytest
 
 from potto.calculus.algebra.point_values import not_zero
 from potto.calculus.algebra.rational_form import is_zero
-from potto.core.terms import ONE, PI, Term, add, app, const, div, global_, mul, pow_, prim, sub, var
+from potto.core.terms import (
+    ONE,
+    PI,
+    ZERO,
+    Term,
+    add,
+    app,
+    branch,
+    const,
+    div,
+    global_,
+    if_,
+    mul,
+    pow_,
+    prim,
+    sub,
+    var,
+)
 
 x, y, t = map(var, "xyt")
 TWO = const(2.0)
+BUMP = mul(sub(y, const(0.3)), sub(const(0.31), y))  # positive where 0.3 < y < 0.31
 
 
 @pytest.mark.parametrize(
@@ -26,6 +46,9 @@ TWO = const(2.0)
         sub(prim("atan", x), prim("asin", div(x, prim("sqrt", add(ONE, mul(x, x)))))),
         sub(prim("max", x, y), div(add(x, y, prim("abs", sub(x, y))), TWO)),
         sub(prim("hypot", x, y), prim("sqrt", add(mul(x, x), mul(y, y)))),
+        sub(prim("clamp", x, y, t), prim("min", prim("max", x, y), t)),
+        sub(branch((sub(x, t),), False, x, y), branch((sub(t, x),), True, y, x)),
+        branch((BUMP,), False, sub(x, x), const(math.nan)),
         sub(app(global_("m", "f"), (add(x, y),)), app(global_("m", "f"), (add(y, x),))),
     ],
 )
@@ -42,6 +65,14 @@ def test_zero(term: Term) -> None:
         sub(prim("atan2", x, t), prim("atan", div(x, t))),  # equal where t > 0 only
         sub(prim("sqrt", mul(x, x)), x),
         sub(app(global_("m", "f"), (x,)), app(global_("m", "f"), (y,))),
+        prim("max", ZERO, BUMP),
+        branch((BUMP,), False, x, ZERO),
+        if_(prim("lt", ZERO, BUMP), x, ZERO),
+        sub(prim("floor", add(y, const(0.69))), prim("floor", add(y, const(0.7)))),
+        sub(
+            add(mul(x, add(x, y)), prim("exp", mul(const(-1e6), pow_(sub(y, const(0.3)), TWO)))),
+            add(mul(x, x), mul(x, y)),
+        ),
         prim("log", prim("neg", mul(x, x))),  # defined nowhere
         PI,
     ],

@@ -497,3 +497,12 @@ def test_plans_of_several_cases_are_made_once(plans: list[Any]) -> None:
     assert (again.value == first.value).all() and (again.tangent == first.tangent).all()
     for at, value in zip(t, first.value, strict=True):
         assert value == pytest.approx(float(thermostat(3, Fraction(at))), abs=1e-14)
+
+
+@pytest.mark.parametrize("inner", ["t*(if [y > 0.3] then y else 0)", "(if [y > 0.3] then t*y else 0)", "t*y*[y > 0.3]"])
+def test_a_bracket_on_what_is_not_known_yet(inner: str) -> None:
+    """Strips y - s*t*y < x < y, s = 0 below 0.3: that had asked for the sign of nan, as 0 times the unknown t."""
+    f = potto.compile(f"def f(t) integral ([0, 1], [-3, 3]) [x < y]*[x > y - {inner}] d(y, x)").f
+    answer = potto.deriv(f)((0.1, 1))
+    covered(answer, Fraction(91, 2000))
+    covered(answer, Fraction(91, 200), tangent=True)

@@ -160,3 +160,27 @@ def test_second_derivatives_by_a_lognormal_number() -> None:
             lambda t: mp.quad(lambda z: -mp.exp(-mp.exp(mp.mpf("0.2") + t * z)) * mp.npdf(z), places), mp.mpf(0.7), 2
         )
     assert abs(found.value - exact) <= found.error <= 1e-10
+
+
+def test_combinations_are_another_one_in_a_narrow_place() -> None:
+    """Where 0.3 < y < 0.31, the exponent is of another combination than the condition: that had been left out.
+
+    With a weight 1 + c in the exponent, the integral over both is that of a Gaussian in closed form.
+    """
+    text = """
+        integral [0, 1] (
+            integral (x ~ normal(0, 1), z ~ normal(0, 1))
+                [x + z < t]*exp(-(x*(1 + 10000*max(0, (y - 0.3)*(0.31 - y))) + z)^2) d(x, z)
+        ) d(y)
+    """
+
+    def weighted(c: Any, t: Any) -> Any:
+        one, other = 1 + c**2, mp.mpf("1.5") - (2 * c - 1) ** 2 / (4 * (1 + c**2))
+        return (1 + mp.erf(mp.sqrt(other) * t)) / (4 * mp.sqrt(one * other))
+
+    def exact(t: Any) -> Any:
+        low, high = mp.mpf(0.3), mp.mpf(0.31)
+        inside = mp.quad(lambda y: weighted(10000 * (y - low) * (high - y), t), [low, high])
+        return inside + (1 - high + low) * weighted(0, t)
+
+    holds(text, exact, 10_000_000, 0.1)

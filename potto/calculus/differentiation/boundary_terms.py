@@ -1,10 +1,10 @@
 """What an integral gains as its surfaces and bounds move, in closed form.
 
-Owns `at_surfaces`, `at_bounds` and `jumps`. At a root r of a surface in one variable of integration the integral
-gains (F left of r - F right of r) dr: the whole integrand, with every branch that flips at r forced to its side and
-every other one as it falls there; no product rule, no value of a bracket on its own edge. A bound gains the integrand
-just inside it. The terms are integrals over the variables that remain, with the bounds of the eliminated one as
-brackets, so that they can be differentiated again.
+Owns `at_surfaces`, `at_bounds`, `jumps` and `identically_zero`. At a root r of a surface in one variable of integration
+the integral gains (F left of r - F right of r) dr: the whole integrand, with every branch that flips at r forced to its
+side and every other one as it falls there; no product rule, no value of a bracket on its own edge. A bound gains the
+integrand just inside it. The terms are integrals over the variables that remain, with the bounds of the eliminated one
+as brackets, so that they can be differentiated again.
 """
 
 from __future__ import annotations
@@ -18,7 +18,6 @@ from potto.calculus.algebra.ranges import Box
 from potto.calculus.algebra.rational_form import is_zero
 from potto.calculus.differentiation.between import between, scaled
 from potto.calculus.differentiation.derivative import partial, total, vanishes, zero_like
-from potto.calculus.differentiation.on_all_sides import is_zero_on_all_sides
 from potto.calculus.differentiation.root_names import NamedRoot
 from potto.calculus.solving.pivots import NoClosedForm as NoClosedForm
 from potto.calculus.solving.pivots import Roots, SurfaceRoot, chosen, conjunction, pivots
@@ -177,7 +176,7 @@ def _at_root(
     instances = _instances(node.body, sums, root.at.free)
     falling = _fall(node.body, flips, sums, instances, box_of(node))
     fall = substitute(falling, {root.variable: root.at})
-    if vanishes(fall) or (exactly and is_zero_on_all_sides(fall)):
+    if vanishes(fall) or (exactly and identically_zero(fall)):
         return
     at = root.at if called is None else called.at
     gain = scaled(fall if called is None else substitute(falling, {root.variable: at}), speed)
@@ -311,6 +310,14 @@ def difference(a: Term, b: Term) -> Term:
     if isinstance(zero, Tuple):
         return tuple_(difference(proj(a, i), proj(b, i)) for i in range(len(zero.items)))
     return ZERO if a is b else sub(a, b)
+
+
+def identically_zero(term: Term) -> bool:
+    """Whether a number, or each of a tuple, is 0 wherever it exists. False also where that is not known."""
+    zero = zero_like(term)
+    if isinstance(zero, Tuple):
+        return all(identically_zero(proj(term, i)) for i in range(len(zero.items)))
+    return is_zero(term)
 
 
 # Without an integral

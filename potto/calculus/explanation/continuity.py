@@ -7,8 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from potto.calculus.differentiation.boundary_terms import JumpTerm
-from potto.calculus.differentiation.on_all_sides import is_zero_on_all_sides
+from potto.calculus.differentiation.boundary_terms import JumpTerm, identically_zero
 from potto.calculus.solving.solve import Sections, sections
 from potto.core.terms import substitute
 
@@ -25,5 +24,5 @@ def continuous(item: JumpTerm, names: Iterable[str]) -> bool:
             continue
         found = sections(item.surface, name)
         if isinstance(found, Sections) and found.complete and found.roots and not found.families:
-            return all(is_zero_on_all_sides(substitute(item.jump, {name: root})) for root in found.roots)
+            return all(identically_zero(substitute(item.jump, {name: root})) for root in found.roots)
     return False
