@@ -7,6 +7,7 @@ fused in either; where a builtin's values differ in the last place, what follows
 from __future__ import annotations
 
 import math
+import platform
 import random
 from fractions import Fraction
 from typing import Any
@@ -106,6 +107,20 @@ def test_arithmetic_is_the_same_to_the_last_bit(seed: int) -> None:
         assert (ours is None) == (theirs is None)
         if ours is not None:
             np.testing.assert_array_equal(*np.broadcast_arrays(ours, theirs))
+
+
+@pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="other processors have an order of zeros")
+@pytest.mark.parametrize("op", ["max", "min"])
+def test_of_two_zeros_the_one_that_numpy_takes(op: str) -> None:
+    """Whether 1/max(x, y) is inf or -inf is told by the sign of the zero; and nan of either side is nan."""
+    f = potto.compile(f"def f(x, y) {op}(x, y)").f
+    x = np.repeat([0.0, -0.0, 1.0, np.nan, -np.inf], 5)
+    x, y = np.tile(x, 100), np.tile([0.0, -0.0, 1.0, np.nan, -np.inf], 500)
+    with potto.settings(backend="native"):
+        found = f(x, y).value
+    exact = {"max": np.maximum, "min": np.minimum}[op](x, y)
+    np.testing.assert_array_equal(found, exact)
+    assert (np.signbit(found) == np.signbit(exact)).all()
 
 
 @pytest.mark.parametrize("kind", ["plain", "not to be written to", "every second", "turned", "empty", "column and row"])
