@@ -83,8 +83,10 @@ class BoxText(RuleText):
         lit = self.told_sides(columns[0]) if self.look.known else self.sides(here)
         for row in range(rows_of(each) - 1):
             at.store(self.zero, self.place(row))
+        bounds = self.low, self.high, self.sizes  # what is made of them for a face is made where it is lit
         for (face, _), mask in zip(self.look.faces, lit, strict=True):
             at.begin("1", at.any(mask))
+            self.low, self.high, self.sizes = (list(map(at.again, ends)) for ends in bounds)
             self.face = function_of(face)
             for added, n in zip(self.added, self.orders, strict=True):
                 self.fill(added, str(n), each)

@@ -206,33 +206,32 @@ class RuleText(RowText):
         _, _, n, _, _, _, _, nodes, speeds = self.tables[i]
         last, between = i + 1 == len(self.plan.variables), at.whole("sub", n, ENDS)
         low, width, own, lost = self.stretch(i, env, self.machine.tracking(), False)
-        slots = [[at.room(1) for _ in range(2 if last else 2 + ENDS)] for _ in range(k1)]
-        for place in (place for row in slots for place in row):
-            at.store(self.zero, place)
-        j = at.begin(between if last else n)
+        each = 2 if last else 2 + ENDS  # what is kept: a size, an error, and what there is at both ends
+        j, before = at.adding(between if last else n, k1 * each)
         ends = [] if last else [self.same(j, at.whole("add", between, side)) for side in range(ENDS)]
         errors = own
         for mask, side in zip(ends, lost, strict=not last):
             errors = [self.either(mask, x, y) for x, y in zip(side, errors, strict=True)]
         here = {**env, self.plan.variables[i]: self.node(low, width, at.constant(nodes, j), errors)}
         most, off = self.at_node(here, bounds, outside) if last else self.few(i + 1, here, bounds, [*outside, *ends])
-        speed = at.constant(speeds, j)
-        for (size, error, *reach), x, y in zip(slots, most, off, strict=True):
-            for place, part in ((size, x), (error, y)):
-                if part is not None:
-                    self.raise_to(place, self.unless(ends, at.apply("mul", part, speed)))
+        speed, after = at.constant(speeds, j), list[str | None]()
+        for c, (x, y) in enumerate(zip(most, off, strict=True)):
+            kept, reach = before[c * each :][:2], before[c * each + 2 : (c + 1) * each]
+            for value, part in zip(kept, (x, y), strict=True):
+                own_size = None if part is None else self.unless(ends, at.apply("mul", part, speed))
+                after.append(None if own_size is None else at.apply("max", value, own_size))
             whole = self.total(x, y)
-            for mask, place in zip(ends, reach, strict=True):
-                at.store(self.either(mask, whole, at.load(place)) or self.zero, place)
-        at.end()
-        largest: Dual = [at.load(size) for size, *_ in slots]
-        worst: Dual = [at.load(error) for _, error, *_ in slots]
+            after += [
+                self.either(mask, whole, value) if whole else None for mask, value in zip(ends, reach, strict=True)
+            ]
+        at.end(*after)
+        largest, worst = after[::each], after[1::each]
         sizes, slack = [self.size(x) for x in width], []
         for number, side in enumerate(lost):
             there = largest
             if not last:
                 plain = at.apply("gt", at.constant(speeds, at.whole("add", between, number)), self.zero)
-                reached = (at.load(row[2 + number]) for row in slots)
+                reached = (x or self.zero for x in after[2 + number :: each])
                 there = [self.finite_or(x, plain, other) for x, other in zip(reached, largest, strict=True)]
             slack.append(self.product(there, side))
         return self.product(largest, sizes), list(map(self.total, self.product(worst, sizes), *slack))
@@ -283,10 +282,11 @@ class RuleText(RowText):
         lower, upper = [low.v, *low.t], [high.v, *high.t]
         width = [self.total(x, None if y is None else at.apply("neg", y)) for x, y in zip(upper, lower, strict=True)]
         if checked:
-            self.only(at.apply("gt", high.v, low.v))
+            fine = at.apply("gt", high.v, low.v)
             for cell in cells:
                 between = at.apply("and", at.apply("gt", cell.v, low.v), at.apply("lt", cell.v, high.v))
-                self.only(at.apply("not", between))
+                fine = at.apply("and", fine, at.apply("not", between))
+            self.only(fine)
         rounding = [[self.times(self.size(x), at.number(EPS)) for x in end] for end in (lower, upper)]
         own, lost = [], []
         for x, y in zip(*rounding, strict=True):
