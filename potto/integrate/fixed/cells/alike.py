@@ -15,7 +15,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from potto.integrate.fixed.cells.product_rule import CANCELS, FEW, ProductRule
+from potto.integrate.fixed.cells.product_rule import CANCELS, FEW, ProductRule, added_together, way_of
 from potto.integrate.fixed.cells.proved_shapes import proved_rules
 from potto.integrate.fixed.cells.topologies import Alike, topologies
 from potto.integrate.fixed.moving_sums import evaluated
@@ -144,25 +144,32 @@ def _settled(
     exact = [None if d is None else d // 2 + 1 for d in degrees] or [None] * len(plan.variables)
     if None in exact:
         rules, todo = proved_rules(plan, exact, machine, env, cell, tight)
-        left = [_applied(rule, env, those, total, fine) for rule, those in rules]
-        todo = np.concatenate((*left, todo))
+        todo = np.concatenate((_applied(rules, env, total, fine), todo)) if rules else todo
         if not todo.size:
             return fine
     for rule in _tried(plan, exact, machine, env, cell, todo, tight):
-        todo = _applied(rule, env, todo, total, fine)
+        todo = _applied([(rule, todo)], env, total, fine)
         if not todo.size:
             break
     return fine
 
 
-def _applied(rule: ProductRule, env: dict[str, Value], todo: Ints, total: Array, fine: Bools) -> Ints:
-    """Add what a rule gives for some of its cells, where it is good enough, and note that; those for which it isn't."""
-    good = rule.added(env, todo, total)
-    if good is not None:
-        fine[todo] = good
-        return todo[~good]
-    step, left = max(1, POINTS // rule.span(env)), []
-    if not rule.native(env):
+def _applied(
+    rules: Sequence[tuple[ProductRule, Ints]], env: dict[str, Value], total: Array, fine: Bools
+) -> Ints:  # fmt: skip
+    """Add what rules give for their cells, where it is good enough, and note that; those for which it isn't."""
+    found = added_together(rules, env, total)
+    if found is None:
+        return np.concatenate([_in_parts(rule, env, todo, total, fine) for rule, todo in rules])
+    index, good = found
+    fine[index] = good
+    return index[~good]
+
+
+def _in_parts(rule: ProductRule, env: dict[str, Value], todo: Ints, total: Array, fine: Bools) -> Ints:
+    """The same for one rule, as many cells at a time as stay in the cache."""
+    step, left = max(1, POINTS // rule.span), []
+    if not rule.native:
         todo = todo[in_rows(rule.cell.between.take(todo), len(rule.orders))]
     for start in range(0, todo.size, step):
         index = todo[start : start + step]
@@ -194,8 +201,9 @@ def _tried(
 ) -> list[ProductRule]:
     """Rules with ever more nodes: the one that does for a polynomial, or from the one on that does for most cells."""
     known = tuple(n is not None for n in exact)
+    way = way_of(plan, cell, known, machine, env)
     tried = [
-        ProductRule(plan, cell, orders, known, machine, tight)
+        ProductRule(plan, cell, orders, known, machine, way, tight)
         for order in ORDERS
         if math.prod(orders := tuple(order if n is None else n for n in exact)) <= MOST_NODES
     ]

@@ -1,7 +1,7 @@
 """One product rule for cells of one shape, whoever's they are, and how far off it is.
 
-Owns `ProductRule` and `Measured`. What the nodes amount to is worked out by numpy, or by machine code once that pays;
-what follows from it is said here.
+Owns `ProductRule`, `way_of`, `added_together` and `Measured`. What the nodes amount to is worked out by numpy, or by
+machine code once that pays; what follows from it is said here.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from msgspec import Struct
 from potto.integrate.fixed.axes import MEAN, Raw, axis
 from potto.integrate.fixed.cells.nodes import at_once
 from potto.integrate.fixed.cells.topologies import Alike
-from potto.integrate.fixed.lowered.cells import LoweredCells, Wanted, lowered_cells
+from potto.integrate.fixed.lowered.cells import LoweredCells, Run, Wanted, lowered_cells
 from potto.integrate.fixed.lowered.rule_text import RuleText
 from potto.integrate.fixed.lowered.total_text import ELSEWHERE, TRACKED, TotalText
 from potto.integrate.fixed.moving_sums import SUMMED
@@ -49,8 +49,9 @@ class Measured(Struct, frozen=True):
 class ProductRule(Struct, frozen=True):
     """A product rule for cells of one shape, with so many nodes for each variable.
 
-    exact: the variables whose coefficients need not tell what it leaves out, as of polynomials. beyond: what is proved
-    that it leaves out of each cell, (1 + k, cells). tight: whether all digits are wanted.
+    exact: the variables whose coefficients need not tell what it leaves out, as of polynomials. way: how machine code
+    does it (`way_of`). beyond: what is proved that it leaves out of each cell, (1 + k, cells). tight: whether all
+    digits are wanted.
     """
 
     plan: StraightIntegral
@@ -58,6 +59,7 @@ class ProductRule(Struct, frozen=True):
     orders: tuple[int, ...]
     exact: tuple[bool, ...]
     machine: Evaluator
+    way: LoweredCells
     tight: bool
     beyond: Array | None = None
 
@@ -65,18 +67,16 @@ class ProductRule(Struct, frozen=True):
     def nodes(self) -> int:
         return math.prod(self.orders)
 
-    def lowered(self, env: dict[str, Value]) -> LoweredCells:
-        kind = TotalText if all(self.exact) else RuleText
-        return lowered_cells(self.plan, self.cell.face, self.machine.directions, env, kind)
-
-    def native(self, env: dict[str, Value]) -> bool:
+    @property
+    def native(self) -> bool:
         """Whether what nodes amount to is for machine code now, which of a rule that is known to do adds it up
         itself."""
-        return not all(self.exact) and self.lowered(env).function(self.machine) is not None
+        return not all(self.exact) and self.way.function(self.machine) is not None
 
-    def span(self, env: dict[str, Value]) -> int:
+    @property
+    def span(self) -> int:
         """How many numbers of a member are kept at a time: those at all nodes, or of coefficients alone."""
-        if not self.native(env):
+        if not self.native:
             return self.nodes
         return sum(len(asked) for asked in self.asked)
 
@@ -89,21 +89,6 @@ class ProductRule(Struct, frozen=True):
         """The integrals over some of the cells."""
         return self._measured(self._raw(env, index, self.asked), index, self.orders)
 
-    def added(self, env: dict[str, Value], index: Ints, total: Array) -> Bools | None:
-        """Add the integrals over some of the cells to those of their members, by machine code: which were good enough.
-        None where that is left to numpy, or coefficients tell. total: (4, 1 + k, B), as of what is `Measured`."""
-        way = self.lowered(env)
-        function = way.function(self.machine)
-        if function is None or not all(self.exact):
-            return None
-        self.machine.count(index.size * self.nodes)
-        several = self._several(index)
-        axes = [axis(order, MEAN, STRAIGHT, several) for order in self.orders]
-        wanted = Wanted(*self._parts, index.size <= FEW, ELSEWHERE if several else 1.0)
-        members, between = self.cell.members.take(index), self.cell.between.take(index)
-        beyond = None if self.beyond is None else self.beyond.take(index, 1)
-        return way.add(function, env, members, between, axes, wanted, beyond, total)
-
     def foreseen(self, env: dict[str, Value], index: Ints, others: Sequence[ProductRule]) -> Iterator[Bools]:
         """For which cells rules with no more nodes than this one would do, by its coefficients."""
         every = zip(self.orders, self.exact, strict=True)
@@ -115,16 +100,20 @@ class ProductRule(Struct, frozen=True):
         turning = [STRAIGHT if exact else ends for exact, ends in zip(self.exact, self.cell.turning, strict=True)]
         given, several = zip(self.orders, asked, turning, strict=True), self._several(index)
         axes = [axis(order, own, ends, several) for order, own, ends in given]
-        way, members, between = self.lowered(env), self.cell.members.take(index), self.cell.between.take(index)
-        function = None if all(self.exact) else way.function(self.machine)
+        members, between = self.cell.members.take(index), self.cell.between.take(index)
+        function = None if all(self.exact) else self.way.function(self.machine)
         if function is not None:
-            return way.run(function, env, members, between, axes, self.machine.directions)
-        with way.promotion.by_numpy():
+            return self.way.run(function, env, members, between, axes, self.machine.directions)
+        with self.way.promotion.by_numpy():
             return at_once(self.plan, self.cell.face, self.machine, env, members, between, axes)
 
     def _several(self, index: Ints) -> bool:
         """Whether there are so many nodes that rounding is followed at few of them."""
         return index.size * self.nodes > TRACKED
+
+    def _beside(self, index: Ints) -> float:
+        """How many times more rounding may be than at the nodes where it is followed."""
+        return ELSEWHERE if self._several(index) else 1.0
 
     def _measured(self, raw: Raw, index: Ints, orders: tuple[int, ...]) -> Measured:
         """What the first coefficients tell, as many as these orders have."""
@@ -137,7 +126,7 @@ class ProductRule(Struct, frozen=True):
             clear = clear & ~(raw.corners > PEAK * raw.largest)
         truncated[:, ~clear] = np.inf
         gross = np.maximum(raw.most, np.abs(raw.number))
-        rounding = (ELSEWHERE if self._several(index) else 1.0) * raw.off + ELSEWHERE * SUMMED * gross
+        rounding = self._beside(index) * raw.off + ELSEWHERE * SUMMED * gross
         return Measured(raw.number, rounding, gross, truncated)
 
     def good(self, found: Measured, known: Array | None = None) -> Bools:
@@ -150,3 +139,34 @@ class ProductRule(Struct, frozen=True):
     def _parts(self) -> tuple[float, float]:
         """What may be left out, as parts of the number and of what is added up."""
         return (TIGHT, TIGHT) if self.tight else (SHARE * self.machine.rtol, CANCELS)
+
+
+def way_of(
+    plan: StraightIntegral, cell: Alike, exact: Sequence[bool], machine: Evaluator, env: dict[str, Value]
+) -> LoweredCells:  # fmt: skip
+    """How machine code does rules for these cells: with totals of members where it is known that nodes are enough."""
+    return lowered_cells(plan, cell.face, machine.directions, env, TotalText if all(exact) else RuleText)
+
+
+def added_together(
+    rules: Sequence[tuple[ProductRule, Ints]], env: dict[str, Value], total: Array
+) -> tuple[Ints, Bools] | None:  # fmt: skip
+    """Add the integrals over some cells to those of their members, by machine code: which cells, and which of them were
+    good enough. None where that is left to numpy, or coefficients tell.
+
+    rules: of cells of one shape, each with those that it is for. total: (4, 1 + k, B), as of what is `Measured`.
+    """
+    first, index = rules[0][0], rules[0][1] if len(rules) == 1 else np.concatenate([own for _, own in rules])
+    function = first.way.function(first.machine)
+    if function is None or not all(first.exact):
+        return None
+    first.machine.count(sum(rule.nodes * own.size for rule, own in rules))
+    runs, start = [], 0
+    for rule, own in rules:
+        axes = [axis(order, MEAN, STRAIGHT, rule._several(own)) for order in rule.orders]
+        runs.append(Run(axes, start, start + own.size, rule._beside(own)))
+        start += own.size
+    wanted = Wanted(*first._parts, index.size <= FEW)
+    members, between = first.cell.members.take(index), first.cell.between.take(index)
+    beyond = None if first.beyond is None else first.beyond.take(index, 1)
+    return index, first.way.add(function, env, members, between, runs, wanted, beyond, total)

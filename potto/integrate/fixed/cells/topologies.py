@@ -155,14 +155,20 @@ def _gathered(plan: StraightIntegral, machine: Evaluator, cells: Found) -> list[
         face = plan.face(tuple(bool(code >> bit & 1) for bit in range(len(children(plan.surfaces.body)))))
         codes.setdefault(face, []).append(code)
     for face, those in codes.items():
-        own = np.any([sides == code for code in those], axis=0) if len(those) < FEW else np.isin(sides, those)
-        dark = nothing(face)
+        own = None  # all of them, as mostly
+        if len(codes) > 1:
+            own = np.any([sides == code for code in those], axis=0) if len(those) < FEW else np.isin(sides, those)
+        dark, lit = nothing(face), sides.size if own is None else int(own.sum())
         if machine.costs is not None:
-            machine.costs.stretches(int(own.sum()), 0 if dark else int(own.sum()))
-        for turn in () if dark else distinct(turns[own]):
-            index = np.nonzero(own & (turns == turn))[0]
+            machine.costs.stretches(lit, 0 if dark else lit)
+        for turn in () if dark else distinct(turns if own is None else turns[own]):
+            there = turns == turn if own is None else own & (turns == turn)
             turning_ends = tuple((bool(turn >> 2 * i & 1), bool(turn >> 2 * i + 1 & 1)) for i in range(count))
-            found.append(Alike(face, turning_ends, cells.between.take(index), cells.members.take(index)))
+            places = (cells.between, cells.members)
+            if not there.all():
+                index = np.flatnonzero(there)
+                places = cells.between.take(index), cells.members.take(index)
+            found.append(Alike(face, turning_ends, *places))
     return found
 
 

@@ -22,6 +22,7 @@ from potto.core.terms import Term, postorder
 from potto.integrate.fixed.axes import Axis, Raw
 from potto.integrate.fixed.lowered.formula_text import ONE, ParameterPlace
 from potto.integrate.fixed.lowered.rule_text import NAME, RuleText
+from potto.integrate.fixed.lowered.total_text import BESIDE
 from potto.integrate.fixed.straight import StraightIntegral
 from potto.integrate.pieces import Evaluator
 from potto.kernels.cells import Array, Bools, Cell, Ints, Value
@@ -41,12 +42,20 @@ AT_ONCE = 1 << 15
 
 class Wanted(Struct, frozen=True):
     """Which cells are good enough: those that are off by no more than a part of what they come to, or of what is added
-    up for them. whole: what a cell goes into counts as what it comes to. beside: how many times more rounding may be
-    than at the nodes where it is followed."""
+    up for them. whole: what a cell goes into counts as what it comes to."""
 
     part: float
     added: float
     whole: bool
+
+
+class Run(Struct, frozen=True):
+    """The cells first ... stop - 1 of some, and the nodes of their rule. beside: how many times more rounding may be
+    than at the nodes where it is followed."""
+
+    axes: Sequence[Axis]
+    first: int
+    stop: int
     beside: float
 
 
@@ -91,27 +100,31 @@ class LoweredCells(Struct, frozen=True):
         return Raw(number, coefficients, most, off, clear, corners, largest)
 
     def add(
-        self, function: Loaded, env: Mapping[str, Value], members: Ints, between: Ints, axes: Sequence[Axis],
+        self, function: Loaded, env: Mapping[str, Value], members: Ints, between: Ints, runs: Sequence[Run],
         wanted: Wanted, beyond: Array | None, total: Array,
     ) -> Bools:  # fmt: skip
         """Add the sums over those cells that are good enough to those of their members; which these are (M,).
 
-        beyond: what is left out of each, (1 + k, M). total: (4, 1 + k, B), numbers, what rounding puts them off, what
-        is added up, and what is left out.
+        runs: one after the other, all cells. beyond: what is left out of each, (1 + k, M). total: (4, 1 + k, B),
+        numbers, what rounding puts them off, what is added up, and what is left out.
         """
         numbers, arrays = given(self.places, env)
-        constants = np.concatenate(((wanted.part, wanted.added, wanted.beside), numbers))
-        least = max(members.size, self.lanes)
+        constants = np.concatenate(((wanted.part, wanted.added, math.nan), numbers))
+        least = max(max(run.stop, run.first + self.lanes) for run in runs)
         good, proved = np.empty((1, least)), beyond is not None
         cells = [whole(column, least) for column in (members, between)]
         left = [whole(row, least) for row in beyond] if beyond is not None else []
-        for start, stop in parts(least, AT_ONCE):
-            told = total.strides[1] // total.itemsize, int(wanted.whole), int(proved), min(stop, members.size) - start
-            frame = frame_of(good[:, start:stop], axes, [*(column[start:stop] for column in cells), *arrays])
-            where = [address(row[start:stop]) for row in left] or [0] * total.shape[1]
-            frame = np.array([*frame, address(total), *told, *where], dtype=np.int64)
-            function.call(address(frame), address(constants))
-        counts.native_points += members.size * math.prod(len(axis.nodes) for axis in axes)
+        told = address(total), total.strides[1] // total.itemsize, int(wanted.whole), int(proved)
+        for run in runs:  # what a short one says of cells behind it, these say themselves later
+            constants[BESIDE] = run.beside
+            for start, stop in parts(max(run.stop - run.first, self.lanes), AT_ONCE):
+                at = slice(run.first + start, run.first + stop)
+                frame = frame_of(good[:, at], run.axes, [*(column[at] for column in cells), *arrays])
+                where = [address(row[at]) for row in left] or [0] * total.shape[1]
+                count = min(at.stop, run.stop) - at.start
+                frame = np.array([*frame, *told, count, *where], dtype=np.int64)
+                function.call(address(frame), address(constants))
+            counts.native_points += (run.stop - run.first) * math.prod(len(axis.nodes) for axis in run.axes)
         return np.asarray(good[0, : members.size] > 0)
 
 

@@ -11,6 +11,7 @@ from collections.abc import Mapping
 import numpy as np
 from msgspec import Struct, field
 
+from potto.core.terms import postorder
 from potto.integrate.fixed.lowered.cells import given, parts, places_of, whole
 from potto.integrate.fixed.lowered.formula_text import ParameterPlace
 from potto.integrate.fixed.lowered.topology_text import FOUND, NAME, TopologyText
@@ -24,6 +25,9 @@ from potto.kernels.native.vectors import LANES
 
 # Members at once, and cells for which there is room: few enough to stay in the cache.
 AT_ONCE, ROOM = 1 << 11, 1 << 16
+# Terms from which on a row may have as many operations as are worth a branch (`row_text.WORTH`), with its tangents and
+# rounding about six for each.
+DEAR = 8
 
 
 class Found(Struct, frozen=True):
@@ -62,6 +66,11 @@ class LoweredTopologies(Struct, frozen=True):
         """How many cells a member may have."""
         return math.prod(len(items) - 1 for items in self.plan.items)
 
+    @property
+    def dear(self) -> bool:
+        """Whether a rule goes through rows one by one: then cells between the same ones had better be neighbours."""
+        return any(len(postorder(item)) >= DEAR for items in self.plan.items for item in items)
+
     def run(self, function: Loaded, env: Mapping[str, Value], batch: int) -> Found:
         """The cells of a batch."""
         constants, arrays = given(self.places, env)
@@ -75,7 +84,7 @@ class LoweredTopologies(Struct, frozen=True):
             function.call(address(frame), address(constants))
             cells = room[:, : frame[FOUND]]
             cells[0] += start
-            found.append(cells.take(in_rows(cells[1], len(self.plan.variables)), 1))
+            found.append(cells.take(in_rows(cells[1], len(self.plan.variables)), 1) if self.dear else cells.copy())
         members, between, sides = np.concatenate(found, axis=1)
         fine: Bools = np.asarray(plain[:batch] > 0)
         if not fine.all():
