@@ -1,7 +1,7 @@
 """Integrands that fall apart into numbers of different variables, max(a + b, c + d): each number has a density.
 
-No order of the variables hands on one number, so that four of them took samples. The references are integrals over one
-variable by mpmath, and closed forms.
+No order of the variables hands on one number, so that four of them took samples. Numbers may be made of such numbers,
+in trees of sums and extremes. The references are integrals over one variable by mpmath, of distributions in closed form.
 """
 
 from __future__ import annotations
@@ -98,3 +98,66 @@ def test_any_order_of_the_variables() -> None:
         every = ", ".join(bounds[name] for name in order.split(", "))
         found = potto.compile(f"def f(t) integral ({every}) max(a + b, c + d) d({order})").f(1)
         assert found.converged and abs(found.value - value) <= found.error
+
+
+def gamma(s: Any) -> Any:
+    """How often the sum of two exponential(1) is less than s."""
+    return 1 - (1 + s) * mp.exp(-s)
+
+
+def triangle(s: Any) -> Any:
+    """How often the sum of two uniform(0, 1) is less than s."""
+    return s * s / 2 if s <= 1 else 1 - (2 - s) ** 2 / 2 if s <= 2 else mp.mpf(1)
+
+
+def above_each(greatest: Number) -> Number:
+    """How often the greatest of two normal(0, 1) and what has another distribution add up to less than t."""
+    return lambda t: mp.quad(lambda x: 2 * mp.npdf(x) * mp.ncdf(x) * greatest(t - x), [-12, -6, -3, -1, 0, 1, 3, 6, 12])
+
+
+def waits_and_a_wait(t: Any) -> Any:
+    """How often max(a + b, c + d) + max(e, f) < t of exponential(1) numbers."""
+    return mp.quad(lambda s: 2 * gamma(s) * s * mp.exp(-s) * (1 - mp.exp(s - t)) ** 2, [0, t])
+
+
+def flat_numbers(t: Any) -> Any:
+    """The same of uniform(0, 1) numbers, for t from 2 to 3."""
+
+    def density(s: Any) -> Any:
+        return 2 * triangle(s) * (s if s <= 1 else 2 - s)
+
+    return mp.quad(density, [0, 1, t - 1]) + mp.quad(lambda s: density(s) * (t - s) ** 2, [t - 1, 2])
+
+
+def lesser(t: Any) -> Any:
+    """The mean of min(a + b, max(c + d, t*e + t*f)) of uniform(0, 1) numbers, for t < 1."""
+    return mp.quad(lambda s: (1 - triangle(s)) * (1 - triangle(s) * triangle(s / t)), sorted([0, t, 2 * t, 1, 2]))
+
+
+UNIT, WAIT, NORMAL = "uniform(0, 1)", "exponential(1)", "normal(0, 1)"
+# measure of each, names, body, value as a function of t, error that is admitted, the most evaluations
+TREES: list[tuple[str, str, str, Number, float, int]] = [
+    (UNIT, "abcdef", "max(t*(a + b), max(t*(c + d), t*(e + f)))", lambda t: mp.mpf("1.35")*t, 1e-11, 50_000),
+    (UNIT, "abcdef", "min(a + b, max(c + d, t*e + t*f))", lesser, 1e-11, 100_000),
+    (WAIT, "abcdef", "t*max(a + b, max(c + d, e + f))", lambda t: mp.mpf(347)/108*t, 1e-9, 2_000_000),
+    (WAIT, "abcdef", "exp(-t*max(a + b, max(c + d, e + f)))",
+     lambda t: t*mp.quad(lambda s: mp.exp(-t*s)*gamma(s)**3, [0, 1, 3, 10, 30, 80, 200]), 1e-9, 2_000_000),
+    (NORMAL, "abcd", "[max(a, c) + max(b, d) < t]", above_each(lambda s: mp.ncdf(s)**2), 1e-10, 500_000),
+    (WAIT, "abcdef", "[max(a + b, c + d) + max(e, f) < 2 + t]", lambda t: waits_and_a_wait(2 + t), 1e-10, 200_000),
+    (UNIT, "abcdef", "[max(a + b, c + d) + max(e, f) < 2 + t]", lambda t: flat_numbers(2 + t), 1e-10, 3_000_000),
+    (UNIT, "abcdef", "t*max(max(a, b) + c, max(d, e) + f)", lambda t: mp.mpf(869)/630*t, 1e-11, 100_000),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("measure", "names", "body", "exact", "off", "evals"), TREES, ids=[f"{row[0]} {row[2]}" for row in TREES]
+)
+def test_trees(measure: str, names: str, body: str, exact: Number, off: float, evals: int) -> None:
+    """Errors that are admitted: what is asked for, with the density's tails where ranges are infinite."""
+    bounds = ", ".join(f"{name} ~ {measure}" for name in names)
+    found = potto.grad(potto.compile(f"def f(t) integral ({bounds}) {body} d({', '.join(names)})").f, "t")(T)
+    with mp.workdps(25):
+        value, rate = exact(mp.mpf(T)), mp.diff(exact, mp.mpf(T), h=mp.mpf(10) ** -8)
+    assert abs(found.value - value) <= found.error <= off
+    assert abs(found.tangent - rate) <= found.tangent_error <= off
+    assert found.method == "quadrature" and found.evals <= evals

@@ -18,9 +18,8 @@ from fractions import Fraction
 from functools import lru_cache, partial, reduce
 
 from msgspec import Struct
-from msgspec.structs import replace
 
-from potto.calculus.decomposition.distributions import distributed
+from potto.calculus.decomposition.distributions import density_at, distributed
 from potto.calculus.decomposition.factors import Names, factors, summands
 from potto.core.collecting import split
 from potto.core.polynomials import number
@@ -55,15 +54,16 @@ MOST_SUMMANDS = 8
 
 class Distribution(Struct, frozen=True):
     """A number of variables that count through it alone: its density is the sum of what these steps of other integrals
-    come to, each from the number as its state."""
+    come to, each from the number, `variable`, as its state."""
 
+    variable: str
     number: Term
     over: Integral
     densities: tuple[tuple[Integral, tuple[EliminationStep, ...]], ...]
 
 
 class EliminationStep(Struct, frozen=True):
-    """V(state) = integral over [lo, hi] of weight * V_next(passed) d(variable), of which the density is a factor.
+    """V(state) = integral over [lo, hi] of weight * V_next(passed) d(variable), times densities at some places.
 
     state: the name of the number that is handed on from further out; None where there is none. passed: the number that
     is handed on further in; None where what is further in depends on none, and for the last variable, whose weight is
@@ -76,7 +76,11 @@ class EliminationStep(Struct, frozen=True):
     state: str | None
     weight: Term
     passed: Term | None
-    density: Distribution | None = None
+    densities: tuple[tuple[Distribution, Term], ...] = ()
+
+    def over(self, distribution: Distribution) -> bool:
+        """Whether it integrates over the number of a distribution, from the least that it may be to the greatest."""
+        return self.variable == distribution.variable
 
 
 class _MoreThanOne(Exception):
@@ -87,22 +91,30 @@ class _MoreThanOne(Exception):
 def eliminate(term: Integral) -> tuple[EliminationStep, ...] | None:
     """The steps, outermost first, in the first order of the variables that does, or of fewer of them with a number in
     the place of others; None where in each of them more than one number would have to be handed on."""
-    steps = _chain(term, None)
+    return _eliminated(term, ())
+
+
+@lru_cache(maxsize=1024)
+def _eliminated(term: Integral, known: tuple[Distribution, ...]) -> tuple[EliminationStep, ...] | None:
+    """The same where the densities of some variables are known."""
+    steps = _chain(term, None, known)
     if steps is not None:
         return steps
     for way in distributed(term):
-        chains = [_chain(density, way.variable) for density in way.densities]
-        further = eliminate(way.term) if all(chain is not None for chain in chains) else None
+        chains = [_chain(density, way.variable, known) for density in way.densities]
+        each = tuple((own, chain) for own, chain in zip(way.densities, chains, strict=True) if chain is not None)
+        if len(each) < len(chains):
+            continue
+        further = _eliminated(way.term, (*known, Distribution(way.variable, way.number, way.over, each)))
         if further is not None:
-            each = tuple((own, chain) for own, chain in zip(way.densities, chains, strict=True) if chain is not None)
-            known = Distribution(way.number, way.over, each)
-            return tuple(replace(step, density=known) if step.variable == way.variable else step for step in further)
+            return further
     return None
 
 
-def _chain(term: Integral, state: str | None) -> tuple[EliminationStep, ...] | None:
-    """The steps in the first order of the variables that does. state: a number that is known to begin with."""
-    return next((steps for order in _orders(term) if (steps := _in_order(order, state)) is not None), None)
+def _chain(term: Integral, state: str | None, known: tuple[Distribution, ...]) -> tuple[EliminationStep, ...] | None:
+    """The steps in the first order of the variables that does. state: a number that is known to begin with. known:
+    whose densities are."""
+    return next((steps for order in _orders(term) if (steps := _in_order(order, state, known)) is not None), None)
 
 
 @lru_cache(maxsize=1024)
@@ -131,7 +143,7 @@ def _orders(term: Integral) -> Iterator[Integral]:
         yield reordered(term, list(order))
 
 
-def _in_order(term: Integral, state: str | None) -> tuple[EliminationStep, ...] | None:
+def _in_order(term: Integral, state: str | None, known: tuple[Distribution, ...]) -> tuple[EliminationStep, ...] | None:
     everything = (term.body, *(bound for pair in term.bounds for bound in pair))
     kinds = (Const, Var, Prim, Branch, If, App, Global)
     if not all(isinstance(node, kinds) for part in everything for node in postorder(part)):
@@ -142,7 +154,8 @@ def _in_order(term: Integral, state: str | None) -> tuple[EliminationStep, ...] 
         lo, hi = bounds[i]
         inner = frozenset(term.variables[i + 1 :])
         if not inner:
-            return (*steps, EliminationStep(variable, lo, hi, state, rest, None))
+            weight, densities = _densities(rest, known)
+            return (*steps, EliminationStep(variable, lo, hi, state, weight, None, densities))
         here = frozenset((variable,)) if state is None else frozenset((variable, state))
         weight, rest = _split(rest, here, inner)
         handed = _Handed(here, inner, f"{variable}@known")
@@ -151,9 +164,26 @@ def _in_order(term: Integral, state: str | None) -> tuple[EliminationStep, ...] 
             bounds[i + 1 :] = [(handed.put(a), handed.put(b)) for a, b in bounds[i + 1 :]]
         except _MoreThanOne:
             return None
-        steps.append(EliminationStep(variable, lo, hi, state, weight, handed.written))
+        weight, densities = _densities(weight, known)
+        steps.append(EliminationStep(variable, lo, hi, state, weight, handed.written, densities))
         state = None if handed.written is None else handed.name
     return None
+
+
+def _densities(
+    term: Term, known: tuple[Distribution, ...]
+) -> tuple[Term, tuple[tuple[Distribution, Term], ...]]:  # fmt: skip
+    """A term without the factors of it that are densities, and these: whose, and at which places."""
+    by_name = {distribution.variable: distribution for distribution in known}
+    rest: list[Term] = []
+    found: list[tuple[Distribution, Term]] = []
+    for factor in factors(term):
+        at = density_at(factor)
+        if at is None:
+            rest.append(factor)
+        else:
+            found.append((by_name[at[0]], at[1]))
+    return (mul(*rest) if rest else ONE, tuple(found)) if found else (term, ())
 
 
 def _bare(body: Term) -> Term:

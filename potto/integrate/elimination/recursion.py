@@ -1,57 +1,33 @@
 """Integrals over many variables as integrals over one, each of a table of the one before.
 
-Owns `Eliminated`, `eliminated` (what is known of the steps before any number) and `one_by_one` (the numbers). What each
-step leaves in the number that it depends on, the places where a surface enters or leaves the bounds, are the pieces of
-its table, and the cuts of the next step.
+Owns `one_by_one`, the numbers of what `step_plans` says. What each step leaves in the number that it depends on, the
+places where a surface enters or leaves the bounds, are the pieces of its table, and the cuts of the next step.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from functools import lru_cache, partial
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from msgspec import Struct
 from msgspec.structs import replace
 
 from potto.calculus.algebra.affine import affine
 from potto.calculus.algebra.ranges import ValueRange, range_of
-from potto.calculus.decomposition.distributions import ends_of, hints_of
-from potto.calculus.decomposition.elimination import Distribution, EliminationStep, eliminate
-from potto.calculus.decomposition.surface_cuts import MOST_CENTERS, cut_along, points_of
-from potto.calculus.decomposition.sweep import Level, sweep
-from potto.calculus.surfaces.case_split import cased
-from potto.calculus.surfaces.discontinuities import TooDeep, findings
-from potto.calculus.surfaces.finding import Finding, Kind, Resolve
+from potto.calculus.decomposition.distributions import ends_of, extremes, hints_of
+from potto.calculus.decomposition.elimination import Distribution, EliminationStep
 from potto.core.simplify import simplify
-from potto.core.terms import (
-    ZERO,
-    Deriv,
-    Integral,
-    Lam,
-    Term,
-    Tuple,
-    add,
-    function_of,
-    if_,
-    integral,
-    mul,
-    prim,
-    substitute,
-    tuple_,
-    var,
-)
+from potto.core.terms import ZERO, Lam, Term, add, function_of, if_, mul, prim, substitute, var
 from potto.integrate.adaptive.iterated import Iteration
 from potto.integrate.decomposition.cuts import Cuts
 from potto.integrate.decomposition.effective_range import reaches
-from potto.integrate.decomposition.vanishing import vanishing_of
 from potto.integrate.degenerate.degeneracies import BESIDE, does_jump
 from potto.integrate.elimination.interpolants import InterpolantTable, concentration, tabulated
+from potto.integrate.elimination.step_plans import HIGH, LOW, Eliminated
 from potto.integrate.events import Fold, TwoSided
-from potto.integrate.levels import LevelPlan, group_levels, level_plan
-from potto.integrate.outline import Outline
+from potto.integrate.levels import LevelPlan
 from potto.integrate.pieces import Evaluator, Sums, still
 from potto.integrate.plan import Plan
 from potto.integrate.rules.gauss import EPS
@@ -66,149 +42,62 @@ FINEST = 1e-14
 AFFORDABLE = 3_000_000  # evaluations, a few seconds: more than that is no good use of one number, and not waited for
 FARTHEST = np.finfo(float).max
 SLIVER = 16  # roundings of its ends, that a piece of a table is longer than
-MOST_PLACES = 64  # where the integral over one variable is not smooth in the number that it depends on
+
+# How much wider than the range of an extreme, as a part of it, its density is integrated over: it jumps at the ends,
+# and a jump that lies on a bound can't be told from one that moves past it.
+MARGIN = 2.0**-10
 
 # Where rules look at a density, in deviations, as at a normal one; farther out it may fall more slowly.
 WIDE = (-8.0, -3.0, 0.0, 3.0, 8.0, 24.0, 72.0)
 
-# The names of the least and the largest that a state may be.
-LOW, HIGH = "#low", "#high"
-# A place in the state of a step, as a surface, and what is there.
-Place = tuple[Term, Kind]
 Ranges = Mapping[str, tuple[float, float]]
-
-
-class Eliminated(Struct, frozen=True):
-    """The steps, outermost first: the plan of each, and the state that it depends on as a variable from LOW to HIGH,
-    cut where its integral is not smooth, with hints where it has a peak; None where it depends on none. densities: of
-    each the steps of the summands of its density, if it has one."""
-
-    steps: tuple[EliminationStep, ...]
-    plans: tuple[Plan, ...]
-    states: tuple[LevelPlan | None, ...]
-    densities: tuple[tuple[Eliminated, ...], ...]
-
-
-def eliminated(term: Integral, resolve: Resolve) -> Eliminated | None:
-    """What is known of an integral's steps; None where it has none."""
-    steps = eliminate(term)
-    found = None if steps is None else _known(term, steps, resolve)
-    return None if found is None else found[0]
-
-
-def _known(
-    term: Integral, steps: Sequence[EliminationStep], resolve: Resolve
-) -> tuple[Eliminated, tuple[Place, ...]] | None:
-    """What is known of steps, and where what they come to is not smooth in the state that the first one begins with."""
-    rows: list[tuple[Plan, LevelPlan | None, tuple[Eliminated, ...]]] = []
-    further: tuple[Place, ...] = ()
-    state = ""
-    for step in reversed(steps):
-        chains = () if step.density is None else step.density.densities
-        densities = [_known(own, below, resolve) for own, below in chains]
-        known = [density for density in densities if density is not None]
-        passed = () if step.passed is None else ((substitute(at, {state: step.passed}), kind) for at, kind in further)
-        beside = [*passed, *(place for _, places in known for place in places)]
-        try:
-            found = _planned(step, beside, resolve, _centers(term, step.variable, resolve))
-        except TooDeep:
-            return None
-        if found is None or len(known) < len(densities) or len(found[1]) > MOST_PLACES:
-            return None
-        plan, further = found
-        state = step.state or ""
-        rows.append((plan, _state(state, further) if state else None, tuple(own for own, _ in known)))
-    plans, states, inner = zip(*reversed(rows), strict=True)
-    return Eliminated(tuple(steps), plans, states, inner), further
-
-
-def _state(name: str, places: Sequence[Place]) -> LevelPlan:
-    """The number that a step depends on as a variable, cut at places."""
-    cuts = tuple(replace(cut_along(at, name), turning=kind == "edge", steps=kind == "jump")
-                 for at, kind in places if kind != "center")  # fmt: skip
-    hints = points_of((at for at, kind in places if kind == "center"), name)[:MOST_CENTERS]
-    return level_plan(Level(name, var(LOW), var(HIGH), hints, cuts), (), ())
-
-
-def _planned(
-    step: EliminationStep, beside: Sequence[Place], resolve: Resolve, centers: Iterable[Finding]
-) -> tuple[Plan, tuple[Place, ...]] | None:
-    """The plan of one step, and where its integral is not smooth in its state.
-
-    beside: where its factors are not that come from tables. centers: further ones that the variable has.
-    """
-    body = step.weight if step.passed is None else tuple_((step.weight, step.passed))
-    hints = () if step.density is None else tuple(map(var, hints_of(step.variable)))
-    term = cased(integral((step.variable,), ((step.lo, step.hi),), body, (hints,)))
-    body = term.body
-    weight = body.items[0] if step.passed is not None and isinstance(body, Tuple) else body
-    unknown: set[Term] = set()
-
-    def known(head: Term) -> Lam | Deriv | None:
-        function = resolve(head)
-        if function is None:
-            unknown.add(head)
-        return function
-
-    found = [*(f for f in findings(body, known) if f.kind != "step"), *centers]
-    if unknown or any(f.kind == "jump" and step.variable in f.surface.free and not f.path for f in found):
-        return None
-    found += (Finding(kind, surface) for surface, kind in beside)
-    hides = any(kind == "jump" for _, kind in beside)  # a table can't be told which side to take
-    steps = [f for f in found if f.kind == "jump" and step.variable not in f.surface.free]
-    swept = sweep(term, (f for f in found if f not in steps), known, partial(findings, resolve=known))
-    for cut in swept.levels[0].cuts:
-        if cut.decides and cut.product:
-            steps += (Finding("jump", factor.form) for factor in cut.product.outer)
-    levels, groups = group_levels(swept.levels)
-    numbers = {j.path: (g.number, j.orientation) for g in groups for j in g.cut.jumps}
-    vanishing = vanishing_of(body, numbers, weight)
-    plan = Plan(Outline(term, levels, groups, function_of(body), vanishing, hides), inlined=step.weight)
-    places = (f for f in (*steps, *swept.outer) if f.critical is None)
-    return plan, tuple((f.surface, f.kind) for f in places if step.state in f.surface.free)
-
-
-def _centers(term: Integral, variable: str, resolve: Resolve) -> list[Finding]:
-    """The centers that the integrand has in one variable, whatever the others are."""
-    names = set(term.variables)
-    return [f for f in findings(term.body, resolve) if f.kind == "center" and f.surface.free & names == {variable}]
+Tables = tuple[InterpolantTable, ...]  # whose sum a density is
 
 
 class _Tabled(Iteration):
-    """The integral of one step: weight times what is further in, by its table, or the number that it is, and times the
-    density of the variable."""
+    """The integral of one step: weight times what is further in, by its table, or the number that it is, and times
+    densities, each the sum of some tables at a place."""
 
     further: InterpolantTable | Cell | None = None
-    densities: tuple[InterpolantTable, ...] = ()
+    densities: tuple[Tables, ...] = ()
 
     def body(self, env: dict[str, Value], sides: dict[int, Mask], machine: Evaluator) -> Value:
-        tracking, k = machine.tracking(), self.machine.directions
-        weight, passed = super().body(env, sides, tracking), None
-        if isinstance(self.further, InterpolantTable):
-            assert isinstance(weight, tuple)
-            weight, passed = weight
+        tracking, k, wide = machine.tracking(), self.machine.directions, machine.directions
+        found = super().body(env, sides, tracking)
+        weight, *places = found if isinstance(found, tuple) else (found,)
         given: dict[str, Value] = {"weight": weight}
         if self.further is not None:
-            given["further"] = _at(self.further, passed, k, machine.directions)
-        for number, density in enumerate(self.densities):
-            given[f"density{number}"] = _at(density, env[self.plan.levels[-1].level.variable], k, machine.directions)
-        return tracking.evaluate(_weighted(tuple(given)[1:]), given, None) if len(given) > 1 else weight
+            passed = places.pop(0) if isinstance(self.further, InterpolantTable) else None
+            given["further"] = _at(self.further, passed, k, wide)
+        for number, (tables, place) in enumerate(zip(self.densities, places, strict=True)):
+            for part, table in enumerate(tables):
+                given[_summand(number, part)] = _at(table, place, k, wide)
+        form = _weighted(self.further is not None, tuple(map(len, self.densities)))
+        return tracking.evaluate(form, given, None) if len(given) > 1 else weight
 
 
-def _at(further: InterpolantTable | Cell, passed: Value | None, k: int, wide: int) -> Value:
+def _summand(density: int, part: int) -> str:
+    return f"density{density}.{part}"
+
+
+def _at(further: InterpolantTable | Cell, place: Value | None, k: int, wide: int) -> Value:
     """What a table holds for numbers, or the number that it is."""
     if isinstance(further, InterpolantTable):
-        assert isinstance(passed, Cell)
-        further = further.at(passed, k, wide)
+        assert isinstance(place, Cell)
+        further = further.at(place, k, wide)
     return pad(further, wide)
 
 
 @lru_cache(maxsize=64)
-def _weighted(names: tuple[str, ...]) -> Lam:
-    """The weight times what is further in, and the sum of densities: 0 where the weight is, whatever these are."""
-    further = [var(name) for name in names if name == "further"]
-    densities = [add(*(var(name) for name in names if name != "further"))] if len(names) > len(further) else []
-    return function_of(if_(prim("eq", var("weight"), ZERO), ZERO, mul(var("weight"), *further, *densities)))
+def _weighted(further: bool, counts: tuple[int, ...]) -> Lam:
+    """The weight times what is further in, and densities, of so many parts each: 0 where one of them is, whatever the
+    others are."""
+    below = [var("further")] if further else []
+    densities = [add(*(var(_summand(i, part)) for part in range(count))) for i, count in enumerate(counts)]
+    value = mul(var("weight"), *below, *densities)
+    for factor in (var("weight"), *densities):
+        value = if_(prim("eq", factor, ZERO), ZERO, value)
+    return function_of(value)
 
 
 def one_by_one(
@@ -222,7 +111,7 @@ def one_by_one(
     most = min(settings.max_evals, int(machine.record.spent) + affordable)
     for share in SHARES:
         finer = replace(settings, rtol=max(share * settings.rtol, FINEST), atol=0.0, max_evals=most)
-        sums = _passed_on(known, machine.changed(settings=finer), env, ranges)
+        sums = _passed_on(known, machine.changed(settings=finer), env, ranges, {})
         if not isinstance(sums, Sums):
             break
         sums.e += left_out
@@ -243,27 +132,32 @@ def _lacking(sums: Sums, rtol: float, atol: float) -> float:
 
 
 def _passed_on(
-    known: Eliminated, fine: Any, env: dict[str, Value], ranges: Ranges, first: tuple[float, float] | None = None
+    known: Eliminated,
+    fine: Any,
+    env: dict[str, Value],
+    ranges: Ranges,
+    tables: dict[str, Tables],
+    first: tuple[float, float] | None = None,
 ) -> Sums | InterpolantTable | None:
     """The integral by tables that are as accurate, as a part of their largest values, as `fine` asks for; None where
     one can't be made. A table of it, where the first step has a state, which is in the range `first`.
 
-    ranges: of variables whose range is infinite, what matters of it.
+    ranges: of variables whose range is infinite, what matters of it. tables: of the densities that were needed so far,
+    by the names of the numbers.
     """
     spans, own = _spans(known.steps, env, ranges, first)
     env = {**env, **own}
     further: InterpolantTable | Cell | None = None
     sums: Sums | None = None
     rows = zip(known.steps, known.plans, known.states, known.densities, spans, strict=True)
-    for step, plan, state, summands, span in reversed(list(rows)):
-        tables = _density(step, summands, fine, env, ranges)
-        if tables is None:
-            return None
-        if tables:
-            env.update(zip(hints_of(step.variable), _hints(tables), strict=True))
-        below = [*tables, *([further] if isinstance(further, InterpolantTable) else [])]
-        most = math.prod(table.largest for table in below)
-        alone = _Tabled(plan, fine, START_ORDER, tracked=True, further_in=most, further=further, densities=tables)
+    for step, plan, state, densities, span in reversed(list(rows)):
+        for (distribution, _), summands in zip(step.densities, densities, strict=True):
+            if not _density(distribution.variable, summands, fine, env, ranges, tables):
+                return None
+        beside = tuple(tables[distribution.variable] for distribution, _ in step.densities)
+        below = [further] if isinstance(further, InterpolantTable) else []
+        most = math.prod(sum(table.largest for table in parts) for parts in (below, *beside) if parts)
+        alone = _Tabled(plan, fine, START_ORDER, tracked=True, further_in=most, further=further, densities=beside)
         if state is None:
             sums = alone.run(0, env, 1, {}, fine)
             (further,) = sums.cells(())
@@ -272,24 +166,33 @@ def _passed_on(
             further = _table(replace(alone, plan=inside, first=1), state, span, fine, env, even=not ranges)
             if further is None or fine.exhausted():
                 return None
-        if not all(table.seen for table in below):
+        if not all(table.seen for parts in (below, *beside) for table in parts):
             return None
     return further if isinstance(further, InterpolantTable) else sums
 
 
 def _density(
-    step: EliminationStep, summands: Sequence[Eliminated], fine: Any, env: dict[str, Value], ranges: Ranges
-) -> tuple[InterpolantTable, ...] | None:
-    """The tables whose sum is the density of the variable of a step; None where one can't be made."""
-    low, high = ends_of(step.variable)
-    found: list[InterpolantTable] = []
-    for known in summands:
-        ends = [float(np.ravel(end.v)[0]) for name in (low, high) if isinstance(end := env[name], Cell)]
-        table = _passed_on(known, fine, env, ranges, (ends[0], ends[1]))
-        if not isinstance(table, InterpolantTable):
-            return None
-        found.append(table)
-    return tuple(found)
+    variable: str,
+    summands: Sequence[Eliminated],
+    fine: Any,
+    env: dict[str, Value],
+    ranges: Ranges,
+    tables: dict[str, Tables],
+) -> bool:
+    """Whether there are tables whose sum is the density of a number, made here where there were none; with them it is
+    known where rules look at it."""
+    if variable not in tables:
+        found: list[InterpolantTable] = []
+        low, high = (float(np.ravel(end.v)[0]) for name in ends_of(variable) if isinstance(end := env[name], Cell))
+        for known in summands:
+            table = _passed_on(known, fine, env, ranges, tables, (low, high))
+            if not isinstance(table, InterpolantTable):
+                return False
+            found.append(table)
+        tables[variable] = tuple(found)
+    for name, parts in tables.items():  # also of numbers that this one is made of: they have left places
+        env.update(zip(hints_of(name), _hints(parts), strict=True))
+    return True
 
 
 def _hints(tables: Sequence[InterpolantTable]) -> Iterator[Cell]:
@@ -357,13 +260,25 @@ def _spans(
         if step.state is not None:
             box[step.state] = span
         spans.append(span)
-        if step.density is not None:
-            ends = _reached(step.density, box, ranges)
-            for name, end in zip(ends_of(step.variable), ends, strict=True):
-                box[name], own[name] = (end, end), Cell(end)
+        for distribution, _ in step.densities:
+            _find_ends(distribution, box, ranges, own)
         box[step.variable] = ranges.get(step.variable) or _hull(range_of(step.lo, box), range_of(step.hi, box))
         before = step
     return spans, own
+
+
+def _find_ends(
+    distribution: Distribution, box: dict[str, tuple[float, float]], ranges: Ranges, own: dict[str, Value]
+) -> None:
+    """Puts the ends of the range of a number where they are looked for, those of numbers that it is made of first."""
+    low, high = ends_of(distribution.variable)
+    if low in box:
+        return
+    for _, steps in distribution.densities:
+        for inner in (inner for step in steps for inner, _ in step.densities):
+            _find_ends(inner, box, ranges, own)
+    for name, end in zip((low, high), _reached(distribution, box, ranges), strict=True):
+        box[name], own[name] = (end, end), Cell(end)
 
 
 def _reached(density: Distribution, box: Mapping[str, tuple[float, float]], ranges: Ranges) -> tuple[float, float]:
@@ -372,7 +287,8 @@ def _reached(density: Distribution, box: Mapping[str, tuple[float, float]], rang
     for variable, (lo, hi) in zip(density.over.variables, density.over.bounds, strict=True):
         inside[variable] = ranges.get(variable) or _hull(range_of(lo, inside), range_of(hi, inside))
     found = range_of(density.number, inside)
-    return found.lo, found.hi
+    margin = MARGIN * (found.hi - found.lo) if extremes(density.number) else 0.0
+    return found.lo - margin, found.hi + margin
 
 
 def _hull(a: ValueRange, b: ValueRange) -> tuple[float, float]:

@@ -35,7 +35,7 @@ from potto.runtime.evaluation.machine import Machine
 from potto.runtime.integration.preparation.known_sides import Sided, sided
 
 if TYPE_CHECKING:
-    from potto.integrate.elimination.recursion import Eliminated
+    from potto.integrate.elimination.step_plans import Eliminated
 
 MOST_INTEGRALS = 1024
 MOST_LOOKED_AT = 8  # members that are each asked on which sides they lie
@@ -266,7 +266,7 @@ class Problem:
         """The steps of an integral over many variables that each depend on one number, if it has such; found once."""
         known = self.known.steps
         if not known:
-            from potto.integrate.elimination.recursion import eliminated
+            from potto.integrate.elimination.step_plans import eliminated
 
             with making:
                 known.append(eliminated(self.term, self.plain_function))

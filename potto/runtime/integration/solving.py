@@ -38,7 +38,7 @@ from potto.runtime.integration.methods.attempts import (
     uncertainty,
 )
 from potto.runtime.integration.methods.choices import (
-    endless,
+    long_as_a_rule,
     many,
     passes_on,
     to_be_seen,
@@ -146,7 +146,7 @@ def along_cuts(problem: Problem) -> Sums:
         found = attempted(problem, order, allowed)
         if found.stopped and allowed != most:
             continue
-        if found.stopped and tables is None and endless(problem) and not found.events.every(Degenerate):
+        if found.stopped and tables is None and long_as_a_rule(problem) and not found.events.every(Degenerate):
             tables = eliminated(problem) if passes_on(problem) else []
             if tables and accurate(tables[0].sums, machine.rtol, machine):
                 return tables[0].sums

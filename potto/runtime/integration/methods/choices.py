@@ -110,12 +110,18 @@ def worth_trials(problem: Problem) -> bool:
 
 def passes_on(problem: Problem) -> bool:
     """Whether variables may be eliminated where iterated quadrature, which suits so few, turns out to take long."""
-    three = len(problem.term.variables) == MOST_LEVELS
-    return three and not problem.machine.frozen and bool(eliminable(problem.term))
+    enough = len(problem.term.variables) >= MOST_LEVELS and not many(problem)
+    return enough and not problem.machine.frozen and bool(eliminable(problem.term))
+
+
+def long_as_a_rule(problem: Problem) -> bool:
+    """Whether iterated quadrature that had to stop is better not tried in another order before variables are
+    eliminated: more than three variables take long in each, and so does an infinite range."""
+    return len(problem.term.variables) > MOST_LEVELS or endless(problem)
 
 
 def endless(problem: Problem) -> bool:
-    """Whether a range is infinite: over such iterated quadrature takes long as a rule."""
+    """Whether a range is infinite."""
     ends = (end for pair in problem.term.bounds for end in pair)
     return any(node is INF for node in postorder(*ends))
 

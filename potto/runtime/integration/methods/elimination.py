@@ -16,7 +16,7 @@ from potto.runtime.integration.methods.attempts import Attempt, accurate
 from potto.runtime.integration.problem import Problem
 
 if TYPE_CHECKING:
-    from potto.integrate.elimination.recursion import Eliminated
+    from potto.integrate.elimination.step_plans import Eliminated
 
 # How accurate the answer must be, relatively, instead of that of iteration, and instead of that of samples.
 ACCURATE, WORTH = 1e-8, 1e-4
