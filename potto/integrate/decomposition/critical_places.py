@@ -10,13 +10,15 @@ integrated is continuous there; where it is not, they do as the implicit functio
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from msgspec import Struct
 
-from potto.calculus.decomposition.critical import Critical, slopes_of
-from potto.core.terms import Term, function_of, tuple_
+from potto.calculus.decomposition.critical import Critical, Within, slopes_of
+from potto.calculus.inlining.alike import Leaf, SameShape, alike
+from potto.core.terms import Const, Term, Tuple, function_of, tuple_, var
 from potto.integrate.columns import side_by_side
 from potto.integrate.decomposition.effective_range import Ranges
 from potto.integrate.decomposition.meetings import SEARCHED, Row, as_array, tangents
@@ -51,19 +53,116 @@ def critical_rows(
     low, high = as_array(np.minimum(lo.v, hi.v), batch), as_array(np.maximum(lo.v, hi.v), batch)
     around = BEYOND * np.where(np.isfinite(high - low), high - low, 0.0)
     rows: list[Row] = []
-    for system in systems:
-        beyond = around if system.turning else 0.0
-        found = _places(system, variable, env, low - beyond, high + beyond, near, machine)
-        if found is None:
-            machine.note(Unsearched(variable))
-            continue
-        owner, places, width = found
-        t, et = np.zeros((2, machine.directions if system.steps else 0, owner.size))
-        if t.size:
-            t, et = _speeds(system, variable, env, owner, places, width, machine)
-        same = SAME * np.where(np.isfinite(high - low), high - low, 1.0)
-        rows += _as_rows(system, owner, places[0], width, same, batch, (t, et))
+    same = SAME * np.where(np.isfinite(high - low), high - low, 1.0)
+    systems, env = _in_numbers(systems, env)
+    numbers = frozenset(name for name, value in env.items() if isinstance(value, Cell))
+    groups, unsearched = _groups(systems, variable, numbers)
+    lost = [unsearched]
+    for group in groups:
+        wide = [around if system.turning else 0.0 * around for system in group.systems]
+        ends = low - np.stack(wide), high + np.stack(wide)
+        search = _Search(group.names, group.fixed(env, batch), *group.parts(), near, len(group.systems))
+        owner, places, width = search.solved(ends[0].ravel(), ends[1].ravel(), machine.search)
+        lost.append(len(search.lost))
+        for number, system in enumerate(group.systems):
+            if number in search.lost:
+                continue
+            own = np.nonzero(owner // batch == number)[0]
+            whose, there, off = owner[own] % batch, places[:, own], width[own]
+            t, et = np.zeros((2, machine.directions if system.steps else 0, own.size))
+            if t.size:
+                t, et = _speeds(system, variable, env, whose, there, off, machine)
+            rows += _as_rows(system, whose, there[0], off, same, batch, (t, et))
+    for _ in range(sum(lost)):
+        machine.note(Unsearched(variable))
     return rows
+
+
+class _Alike(Struct, frozen=True):
+    """Systems that are the same but for their numbers, and are searched as one batch: of five balls ten pairs meet.
+
+    names: what they are solved for, the variable that is cut first. terms: equations, slopes row by row, and ends of
+    ranges. columns: what each of their further names is in each system, or the one name that it is in all.
+    """
+
+    systems: tuple[Critical, ...]
+    names: tuple[str, ...]
+    terms: tuple[Term, ...]
+    columns: tuple[tuple[str, tuple[Leaf, ...] | str], ...]
+
+    def parts(self) -> tuple[Sequence[Term], Sequence[Term], Sequence[Term]]:
+        """Equations, slopes and ends."""
+        n = len(self.names)
+        return self.terms[:n], self.terms[n : n + n * n], self.terms[n + n * n :]
+
+    def fixed(self, env: dict[str, Value], batch: int) -> dict[str, Array]:
+        """What does not vary, of all members of the first system, then of all of the second."""
+
+        def of(leaf: Leaf) -> Array:
+            value = leaf.value if isinstance(leaf, Const) else env[leaf.name].v  # type: ignore[union-attr]
+            return as_array(value, batch)
+
+        rows = {name: [var(column)] * len(self.systems) if isinstance(column, str) else column
+                for name, column in self.columns}  # fmt: skip
+        return {name: np.concatenate([of(leaf) for leaf in row]) for name, row in rows.items()}
+
+
+def _in_numbers(systems: Sequence[Critical], env: dict[str, Value]) -> tuple[tuple[Critical, ...], dict[str, Value]]:
+    """Systems with a name of its own for each component of a tuple, and their values."""
+    if not any(isinstance(env.get(name), tuple) for system in systems for name in system.free):
+        return tuple(systems), env
+    waiting, env = flat(tuple(term for system in systems for term in _terms(system)), env)
+    found = []
+    for system in systems:
+        n = len(system.equations)
+        equations, ends, waiting = waiting[:n], waiting[n : 3 * n - 2], waiting[3 * n - 2 :]
+        bounds = zip(system.within, ends[::2], ends[1::2], strict=True)
+        within = tuple(Within(w.variable, lo, hi) for w, lo, hi in bounds)
+        found.append(Critical(tuple(equations), within, system.turning, system.steps))
+    return tuple(found), env
+
+
+def _terms(system: Critical) -> tuple[Term, ...]:
+    """The equations of a system, and the bounds of what is within."""
+    return (*system.equations, *(end for w in system.within for end in (w.lo, w.hi)))
+
+
+@lru_cache(maxsize=256)
+def _groups(systems: tuple[Critical, ...], variable: str, numbers: frozenset[str]) -> tuple[tuple[_Alike, ...], int]:
+    """Systems by what they are but for their numbers, and how many can't be searched. Those that parameters alone
+    decide are left out: they are solved everywhere, or nowhere."""
+    posed: dict[tuple[str, ...], list[tuple[Critical, Term]]] = {}
+    unsearched = 0
+    once = {(frozenset(s.equations), s.within, s.turning, s.steps): s for s in systems}  # whichever two met first
+    for system in once.values():
+        slopes = slopes_of(system, variable)
+        names = (variable, *(w.variable for w in system.within))
+        n = len(names)
+        terms = _terms(system)
+        terms = (*terms[:n], *(slopes or ()), *terms[n:])
+        if slopes is None or not frozenset().union(*(term.free for term in terms)) <= numbers.union(names):
+            unsearched += 1
+        elif all(equation.free.intersection(names) for equation in terms[:n]):
+            posed.setdefault(names, []).append((system, tuple_(terms)))
+    found: list[_Alike] = []
+    for names, members in posed.items():
+        kinds = dict.fromkeys(numbers.difference(names))
+        groups, alone = alike([whole for _, whole in members], kinds, lambda _: None)
+        shapes = [*groups, *(_by_itself(members[place][1], place) for place in alone)]
+        for shape in shapes:
+            pairs = zip(shape.function.params, shape.columns, strict=True)
+            columns = tuple((name, column) for name, column in pairs if name not in names)
+            together = tuple(members[place][0] for place in shape.places)
+            whole = shape.function.body
+            assert isinstance(whole, Tuple)
+            found.append(_Alike(together, names, whole.items, columns))
+    return tuple(found), unsearched
+
+
+def _by_itself(term: Term, place: int) -> SameShape:
+    """One that is like no other."""
+    function = function_of(term)
+    return SameShape(function, function.params, (place,))
 
 
 def _speeds(
@@ -88,35 +187,15 @@ def _speeds(
     return moves[:, 0].T, sizes[:, 0].T * doubt
 
 
-def _places(
-    system: Critical, variable: str, env: dict[str, Value], low: Array, high: Array, near: Ranges, machine: Any
-) -> tuple[Ints, Array, Array] | None:
-    """Whose the solutions are, where (n, P), and how far off along what is cut; None if not all are known."""
-    slopes = slopes_of(system, variable)
-    if slopes is None:
-        return None
-    ends = tuple(end for w in system.within for end in (w.lo, w.hi))
-    names = (variable, *(w.variable for w in system.within))
-    terms, env = flat((*system.equations, *slopes, *ends), env)
-    n = len(names)
-    if not all(equation.free.intersection(names) for equation in terms[:n]):
-        return _none(n)  # what the parameters alone decide is 0 everywhere, or nowhere
-    fixed: dict[str, Array] = {}
-    for name in frozenset().union(*(t.free for t in terms)).difference(names):
-        value = env[name]
-        if not isinstance(value, Cell):
-            return None
-        fixed[name] = as_array(value.v, low.size)
-    search = _Search(names, fixed, terms[:n], terms[n : n + n * n], terms[n + n * n :], near)
-    return search.solved(low, high, machine.search)
-
-
 def _none(n: int) -> tuple[Ints, Array, Array]:
     return np.zeros(0, dtype=np.int64), np.zeros((n, 0)), np.zeros(0)
 
 
 class _Search(Struct):
-    """A search for all solutions, over boxes (n, 2, P): the variable that is cut, then those further in."""
+    """A search for all solutions, over boxes (n, 2, P): the variable that is cut, then those further in.
+
+    count: of systems, which have as many members each, in order. lost: those whose solutions are not all known.
+    """
 
     names: tuple[str, ...]
     fixed: dict[str, Array]
@@ -124,21 +203,27 @@ class _Search(Struct):
     slopes: Sequence[Term]
     ends: Sequence[Term]
     near: Ranges
+    count: int
     found: list[tuple[Ints, Array, Array]] = []
+    lost: set[int] = set()
 
-    def solved(self, low: Array, high: Array, within: Callable[[int], bool]) -> tuple[Ints, Array, Array] | None:
-        """Whose the solutions are, where they are, and how far off along the variable that is cut.
-
-        None where there are too many boxes. within: whether so many more of them are within the budget.
-        """
+    def solved(self, low: Array, high: Array, within: Callable[[int], bool]) -> tuple[Ints, Array, Array]:
+        """Whose the solutions are, where they are, and how far off along the variable that is cut; not all of systems
+        with too many boxes. within: whether so many more of them are within the budget."""
         owner, box = self.whole(low, high)
-        most = max(BOXES, BOXES_EACH * low.size)
+        each = low.size // self.count
+        most = max(BOXES, BOXES_EACH * each)
         tiny = FINEST * (high - low)
         for _ in range(ROUNDS):
             if not owner.size:
                 break
-            if owner.size > most or not within(owner.size):
-                return None
+            boxes = np.bincount(owner // each, minlength=self.count)
+            many = (boxes > 0) if not within(owner.size) else (boxes > most)
+            if many.any():
+                self.lost.update(np.nonzero(many)[0].tolist())
+                fine = ~many[owner // each]
+                owner, box = owner[fine], box[:, :, fine]
+                continue
             owner, box, before = self.narrowed(owner, box)
             side = box[0, 1] - box[0, 0]
             narrow = ~(side > np.maximum(tiny[owner], 4 * EPS * np.abs(box[0]).max(axis=0)))
@@ -255,11 +340,10 @@ class _Search(Struct):
                     break
         self.found.append((owner, 0.5 * (box[:, 0] + box[:, 1]), 0.5 * (box[0, 1] - box[0, 0])))
 
-    @staticmethod
-    def halved(owner: Ints, box: Array) -> tuple[Ints, Array]:
+    def halved(self, owner: Ints, box: Array) -> tuple[Ints, Array]:
         """Boxes halved along all sides that rounding leaves while they are few, else each along its longest."""
         n = box.shape[0]
-        every = owner.size <= FEW
+        every = owner.size <= FEW * self.count
         size = (box[:, 1] - box[:, 0]) / np.maximum(1.0, np.abs(box).max(axis=1))
         sides = ~(size <= ROUNDED)
         longest = np.where(np.isnan(size), np.inf, size).argmax(axis=0)

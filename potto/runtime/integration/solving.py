@@ -151,7 +151,7 @@ def along_cuts(problem: Problem) -> Sums:
             if tables and accurate(tables[0].sums, machine.rtol, machine):
                 return tables[0].sums
         if at_once and most is not None and found.stopped and uncertainty(found.sums) < PROMISING:
-            found = best((found, attempted(problem, order, LONGER * most)))
+            found = best((found, attempted(problem, order, LONGER * max(most, found.taken))))
         along = found.events.every(Degenerate)
         if not along and not found.stopped and (most is None or uncertainty(found.sums) < math.inf):
             return finished(problem, found)

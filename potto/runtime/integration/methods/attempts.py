@@ -57,8 +57,8 @@ def _told_apart(problem: Problem, tied: Tied) -> Sums:
 class Attempt(Struct, frozen=True):
     """An answer by an order of the variables, with what was met on the way to it.
 
-    most: how many evaluations a member it was given, None for all. stopped: whether it had to stop for want of them.
-    tabled: whether it comes from variables eliminated.
+    most: how many evaluations a member it was given, None for all; taken: how many it took, as nodes are evaluated many at
+    once. stopped: whether it had to stop for want of them. tabled: whether it comes from variables eliminated.
     """
 
     order: Integral
@@ -67,18 +67,20 @@ class Attempt(Struct, frozen=True):
     most: int | None = None
     stopped: bool = False
     tabled: bool = False
+    taken: int = 0
 
 
 def attempted(problem: Problem, order: Integral, most: int | None) -> Attempt:
     """What quadrature in an order of the variables comes to with so many evaluations a member; None: with all."""
     machine = problem.machine.apart()
-    limit = math.inf if most is None else machine.record.spent + most
+    before = machine.record.spent
+    limit = math.inf if most is None else before + most
     bounded = limit < machine.settings.max_evals
     if bounded:
         machine = machine.changed(settings=replace(machine.settings, max_evals=math.ceil(limit)))
     sums = in_parts(problem.plan(order), machine, problem.env, problem.batch)
     stopped = most is not None and machine.exhausted() and BUDGET_SPENT in dict(machine.events.every(Shortfall))
-    return Attempt(order, sums, machine.events, most, stopped)
+    return Attempt(order, sums, machine.events, most, stopped, taken=math.ceil(machine.record.spent - before))
 
 
 def uncertainty(sums: Sums) -> float:
