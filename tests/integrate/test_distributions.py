@@ -1,7 +1,8 @@
 """Integrands that fall apart into numbers of different variables, max(a + b, c + d): each number has a density.
 
 No order of the variables hands on one number, so that four of them took samples. Numbers may be made of such numbers,
-in trees of sums and extremes. The references are integrals over one variable by mpmath, of distributions in closed form.
+in trees of sums and extremes. The references are integrals over one variable by mpmath, of distributions in closed
+form.
 """
 
 from __future__ import annotations

@@ -57,7 +57,7 @@ def _told_apart(problem: Problem, tied: Tied) -> Sums:
 class Attempt(Struct, frozen=True):
     """An answer by an order of the variables, with what was met on the way to it.
 
-    most: how many evaluations a member it was given, None for all; taken: how many it took, as nodes are evaluated many at
+    most: how many evaluations a member it was given, None for all. taken: how many it took: nodes are evaluated many at
     once. stopped: whether it had to stop for want of them. tabled: whether it comes from variables eliminated.
     """
 
