@@ -75,6 +75,8 @@ def proved_rules(
     kind = shape * places.shape[1] + region
     counts = np.bincount(kind, minlength=shapes.size * places.shape[1])
     nodes, error = _proofs(plan, stretches, exact, grid, places, counts, machine)
+    if not nodes.any():
+        return [], everybody
     beyond = np.empty((1 + machine.directions, count))
     beyond[0] = error.take(kind)
     for d in range(machine.directions):

@@ -24,7 +24,7 @@ from potto.kernels.native.promotion import Promotion
 from potto.kernels.native.vectors import LANES
 
 # Members at once, and cells for which there is room: few enough to stay in the cache.
-AT_ONCE, ROOM = 1 << 11, 1 << 16
+AT_ONCE, ROOM = 1 << 13, 1 << 16
 # Terms from which on a row may have as many operations as are worth a branch (`row_text.WORTH`), with its tangents and
 # rounding about six for each.
 DEAR = 8
