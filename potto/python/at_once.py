@@ -239,14 +239,12 @@ def at_once(
     settled = direct.settled(unused(machine), dict(zip(term.params, values, strict=True)))
     if settled is None or any(value is None for value in given.values()):
         return None
+    kept = AtOnce(machine.settings, reads, type(found), wrt, dual, settled, {})
     with Clock() as clock:
-        totals = settled.at(given)
-    if totals is None:
+        again = kept.answer(args, machine.settings)
+    if again is None or _told(again) != _told(found):
         return None
-    stats = stats_of(Record(evaluations=totals.nodes, integrals=found.stats["integrals"]), clock)
-    kept = AtOnce(machine.settings, reads, type(found), wrt, dual, settled, stats)
-    again = kept.answer(args, machine.settings)
-    return kept if again is not None and _told(again) == _told(found) else None
+    return replace(kept, stats=stats_of(Record(evaluations=again.evals, integrals=found.stats["integrals"]), clock))
 
 
 def _read(name: str, arg: Any, value: Value, dual: bool) -> Read | None:

@@ -17,9 +17,11 @@ from potto.calculus.surfaces.domains import ends_of_domain
 from potto.core import binders, packing
 from potto.core.terms import Term, rebuild
 from potto.integrate import plan
+from potto.integrate.fixed.steps import step_integral
 from potto.integrate.outline import Outline, outlined
 from potto.kernels import compile as kernels
 from potto.kernels.written import Written
+from potto.runtime.integration import settled_calls
 
 RENDERER = """
 def renderer(c, shader)
@@ -95,6 +97,8 @@ def test_what_holds_no_call_is_not_rebuilt_for_another_shader(monkeypatch: pytes
         (47, degree, "_node", 6),  # of the shader's body and the product that it stands in
         (48, packing._Writer, "fields", 0),  # the outline's bytes are those of the first
         (49, discontinuities, "centers", 4),  # of the shader's builtins
+        (50, step_integral, "affine", 0),  # where surfaces cut is known
+        (51, step_integral, "mul", 0),  # so are the heights of the steps
     ],
 )
 def test_what_another_shader_leaves_as_it_was_is_not_looked_through(
@@ -181,3 +185,23 @@ jumping = \\x . [x < 0.2]
     assert len(outlines) == 1
     assert float(m.f(0.5, m.jumping)) == pytest.approx(0.2, abs=1e-15)
     assert len(outlines) == 2
+
+
+def test_an_answer_is_worked_out_twice_at_its_first_call_and_then_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Once in the general way, and once as calls near it are answered, which must come to the same."""
+    answered: list[float] = []
+    at = settled_calls.SteppedCall.at
+
+    def counted(self: settled_calls.SteppedCall, env: Any) -> Any:
+        answered.append(env["t"].v)
+        return at(self, env)
+
+    monkeypatch.setattr(settled_calls.SteppedCall, "at", counted)
+    m = potto.compile(
+        "def f(t) integral [0, 1] exp(x)*(" + " + ".join(f"[x < {k}/53*t]" for k in range(1, 53)) + ") d(x)"
+    )
+    exact = np.expm1(0.9 * np.arange(1, 53) / 53).sum()
+    for times in (2, 3, 4):
+        found = m.f(0.9)
+        assert abs(found.value - exact) <= found.error + 1e-13
+        assert len(answered) == times and found.stats["evaluations"] == found.evals > 0

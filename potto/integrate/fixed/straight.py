@@ -37,7 +37,7 @@ from potto.core.terms import (
 )
 from potto.integrate.fixed.steps.step_integral import StepIntegral, step_integral
 from potto.integrate.levels import LevelPlan
-from potto.integrate.rules.complex_enclosures import enclosable
+from potto.integrate.rules.complex_enclosures import enclosable, known_to_discs
 from potto.kernels.cells import Ints
 
 MOST_VARIABLES, MOST_CUTS, MOST_TERMS = 3, 13, 600
@@ -120,21 +120,14 @@ def straight(term: Integral, body: Term, levels: Sequence[LevelPlan]) -> Straigh
     cuts = [cut for level in levels for cut in children(level.frame.body)]
     # What the program chooses by may have two derivatives at an edge. The formulas of a root go over into each other.
     written = {*postorder(term), *nodes}
-    solved = (node for cut in cuts for node in postorder(cut) if node not in written)
+    solved = (node for node in postorder(*cuts) if node not in written)
     choices = tuple({choice: None for node in solved if (choice := _choice(node, term))})
-    either = _chosen(tuple_(cuts), dict.fromkeys(choices))
-    if len(choices) > MOST_CHOICES or not all(map(enclosable, (*surfaces, _all_sides(body), *children(either)))):
+    either = children(_chosen(tuple_(cuts), dict.fromkeys(choices))) if choices else cuts
+    if len(choices) > MOST_CHOICES or not (all(map(enclosable, (*surfaces, *either))) and _enclosable_sides(body)):
         return None
     places, frames = zip(*(_distinct(level.frame) for level in levels), strict=True)
     free = body.free.union(*(frame.body.free for frame in frames)) - set(term.variables)
-    jumps = tuple(
-        tuple(
-            (cut.surface, tuple({place[row] for row, (at, _) in enumerate(level.rows, 2) if at == number}))
-            for number, cut in enumerate(level.level.cuts)
-            if cut.jumps
-        )
-        for level, place in zip(levels, places, strict=True)
-    )
+    jumps = tuple(_jumps(level, place) for level, place in zip(levels, places, strict=True))
     turning = tuple(
         frozenset(place[row] for row, (_, turns) in enumerate(level.rows, 2) if turns)
         for level, place in zip(levels, places, strict=True)
@@ -144,6 +137,14 @@ def straight(term: Integral, body: Term, levels: Sequence[LevelPlan]) -> Straigh
         term.variables, frames, jumps, turning, shared, body, function_of(tuple_(surfaces)), tuple(sorted(free)),
         choices=function_of(tuple_(choices)) if choices else None, steps=steps,
     )  # fmt: skip
+
+
+def _jumps(level: LevelPlan, place: Mapping[int, int]) -> tuple[tuple[Term, tuple[int, ...]], ...]:
+    """The surfaces at which the integrand jumps, with the rows of their cuts."""
+    rows: dict[int, set[int]] = {}
+    for row, (number, _) in enumerate(level.rows, 2):
+        rows.setdefault(number, set()).add(place[row])
+    return tuple((cut.surface, tuple(rows.get(number, ()))) for number, cut in enumerate(level.level.cuts) if cut.jumps)
 
 
 def _choice(node: Term, term: Integral) -> Term | None:
@@ -225,25 +226,23 @@ def _distinct(frame: Lam) -> tuple[dict[int, int], Lam]:
     """A frame with each formula once: where a line meets a bound in a corner, a cut is that bound for all parameters.
     With the new place of each row."""
     items = children(frame.body)
-    kept = list(dict.fromkeys(items))
+    kept = {item: place for place, item in enumerate(dict.fromkeys(items))}
     if len(kept) == len(items) or items[0] is items[1]:
         return {row: row for row in range(len(items))}, frame
-    return {row: kept.index(item) for row, item in enumerate(items)}, function_of(tuple_(kept))
+    return {row: kept[item] for row, item in enumerate(items)}, function_of(tuple_(kept))
 
 
 def _not_plain(level: LevelPlan) -> bool:
     return bool(level.found or level.corners or any(level.turned))
 
 
-def _all_sides(body: Term) -> Term:
-    """A term with everything in it that the integrand has on any of its sides."""
-    memo: dict[Term, Term] = {}
-    for node in postorder(body):
-        if isinstance(node, Branch):
-            memo[node] = prim("add", memo[node.then], memo[node.orelse])
-        else:
-            memo[node] = rebuild(node, tuple(memo[c] for c in children(node)))
-    return memo[body]
+def _enclosable_sides(body: Term) -> bool:
+    """Whether everything is enclosable that the integrand is on any of its sides."""
+
+    def below(node: Term) -> Sequence[Term]:
+        return (node.then, node.orelse) if isinstance(node, Branch) else children(node)
+
+    return all(isinstance(node, Branch) or known_to_discs(node) for node in postorder(body, below=below))
 
 
 def on_sides(body: Term, sides: Mapping[Term, bool]) -> Term:

@@ -100,19 +100,19 @@ def _repeated(x: Form, exponent: int) -> Form:
 @lru_cache(maxsize=4096)
 def enclosable(term: Term) -> bool:
     """Whether `enclosed` knows everything that a term is made of."""
-    for node in postorder(term):
-        match node:
-            case Const() | Var():
-                pass
-            case Prim(op="pow"):
-                if not isinstance(node.args[1], Const):
-                    return False
-            case Prim():
-                if not DISCS.knows(node.op):
-                    return False
-            case _:
-                return False
-    return True
+    return all(map(known_to_discs, postorder(term)))
+
+
+def known_to_discs(node: Term) -> bool:
+    """Whether `enclosed` knows what a term does with its parts."""
+    match node:
+        case Const() | Var():
+            return True
+        case Prim(op="pow"):
+            return isinstance(node.args[1], Const)
+        case Prim():
+            return DISCS.knows(node.op)
+    return False
 
 
 def enclosed(terms: Sequence[Term], env: Mapping[str, Form], known: dict[Term, Form], h: Array) -> list[Form]:

@@ -9,6 +9,7 @@ n conditions cost as much as n cells, where a formula of n terms on each of them
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import Any
 
 from msgspec import Struct
@@ -130,14 +131,8 @@ class _Reading:
 
     def _side(self, surface: Term) -> tuple[int, bool] | None:
         if surface not in self.sides:
-            found = affine(surface, (self.variable,))
-            slope = found.coefficients[0] if found is not None else ZERO
-            if found is None or not isinstance(slope, Const) or slope.value == 0:
-                self.sides[surface] = None
-            else:
-                cut = _root(found.rest, slope)
-                row = self.rows.setdefault(cut, BOUNDS + len(self.rows))
-                self.sides[surface] = row, slope.value > 0
+            found = _cut(surface, self.variable)
+            self.sides[surface] = found and (self.rows.setdefault(found[0], BOUNDS + len(self.rows)), found[1])
         return self.sides[surface]
 
     def put_together(self, body: Term) -> Term:
@@ -159,36 +154,55 @@ class _Reading:
     def _named(self, line: Term) -> Term:
         return var(self.names.setdefault(line, f"step'{len(self.names) + 1}"))
 
-    def heights(self, line: Term) -> tuple[tuple[int, ...], list[Term]]:
-        """The rows of the cuts of a step function, and its heights as `StepIntegral` has them: many are added up by
-        numbers alone, with less rounding than that of a term."""
-        rest: list[Term] = []
-        parts: dict[int, tuple[list[Term], list[Term]]] = {}
-        todo: list[tuple[Term, Term]] = [(line, ONE)]
-        while todo:
-            node, factor = todo.pop()
-            match node:
-                case _ if self._still(node):
-                    rest.append(mul(factor, node))
-                case Branch():
-                    side = self._side(node.surface)
-                    assert side is not None
-                    row, rising = side
-                    below, above = (node.orelse, node.then) if rising else (node.then, node.orelse)
-                    level, change = parts.setdefault(row, ([], []))
-                    level.append(mul(factor, below))
-                    change.append(mul(factor, sub(above, below)))
-                case Prim(op="mul"):
-                    (part,) = [arg for arg in node.args if not self._still(arg)]
-                    todo.append((part, mul(factor, *_others(node.args, part))))
-                case Prim(op="div", args=(over, under)):
-                    todo.append((over, div(factor, under)))
-                case Prim(op="neg"):
-                    todo.append((node.args[0], neg(factor)))
-                case _:
-                    todo += [(arg, factor) for arg in children(node)]
-        levels, changes = zip(*parts.values(), strict=True)
-        return tuple(parts), [add(*rest), *(add(*own) for own in (*levels, *changes))]
+    def heights(self, line: Term) -> tuple[tuple[int, ...], tuple[Term, ...]]:
+        """The rows of the cuts of a step function, and its heights as `StepIntegral` has them."""
+        cuts, heights = _heights(line, self.variable)
+        return tuple([self.rows[cut] for cut in cuts]), heights
+
+
+# What follows from a surface or a step function alone is found once: one shader takes another's place.
+@lru_cache(maxsize=4096)
+def _cut(surface: Term, variable: str) -> tuple[Term, bool] | None:
+    """Where a surface that is affine in the variable cuts it, and whether it increases along it; None where its slope
+    is not a number."""
+    found = affine(surface, (variable,))
+    slope = found.coefficients[0] if found is not None else ZERO
+    if found is None or not isinstance(slope, Const) or slope.value == 0:
+        return None
+    return _root(found.rest, slope), slope.value > 0
+
+
+@lru_cache(maxsize=256)
+def _heights(line: Term, variable: str) -> tuple[tuple[Term, ...], tuple[Term, ...]]:
+    """The cuts of a step function, and its heights as `StepIntegral` has them: many are added up by numbers alone, with
+    less rounding than that of a term."""
+    rest: list[Term] = []
+    parts: dict[Term, tuple[list[Term], list[Term]]] = {}
+    todo: list[tuple[Term, Term]] = [(line, ONE)]
+    while todo:
+        node, factor = todo.pop()
+        match node:
+            case _ if variable not in node.free:
+                rest.append(mul(factor, node))
+            case Branch():
+                side = _cut(node.surface, variable)
+                assert side is not None
+                cut, rising = side
+                below, above = (node.orelse, node.then) if rising else (node.then, node.orelse)
+                level, change = parts.setdefault(cut, ([], []))
+                level.append(mul(factor, below))
+                change.append(mul(factor, sub(above, below)))
+            case Prim(op="mul"):
+                (part,) = [arg for arg in node.args if variable in arg.free]
+                todo.append((part, mul(factor, *_others(node.args, part))))
+            case Prim(op="div", args=(over, under)):
+                todo.append((over, div(factor, under)))
+            case Prim(op="neg"):
+                todo.append((node.args[0], neg(factor)))
+            case _:
+                todo += [(arg, factor) for arg in children(node)]
+    levels, changes = zip(*parts.values(), strict=True)
+    return tuple(parts), (add(*rest), *(add(*own) for own in (*levels, *changes)))
 
 
 def _root(rest: Term, slope: Const) -> Term:
