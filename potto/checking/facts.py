@@ -14,9 +14,11 @@ from msgspec import Struct
 from potto.calculus.checking.conditions import conditions_of
 from potto.calculus.checking.diffeo import exported
 from potto.calculus.decomposition.guards import unguarded
+from potto.calculus.explanation.bound_names import as_written
 from potto.calculus.explanation.decimals import in_decimals
 from potto.calculus.explanation.explain import describe
 from potto.calculus.explanation.fields import fields_of
+from potto.calculus.explanation.fractions import as_the_program_writes
 from potto.calculus.explanation.layout import WIDTH, DerivativeText, IntegralText, Show, meets
 from potto.calculus.explanation.symbols import Rewrite
 from potto.calculus.inlining.expand import expanded
@@ -25,7 +27,7 @@ from potto.core.printer import format_term
 from potto.core.simplify import simplify
 from potto.core.terms import App, Branch, Const, Delta, Deriv, Global, Lam, Term, postorder
 from potto.elaborate import core, elaborate_expression
-from potto.modules import is_recursive
+from potto.modules import definition, is_recursive
 from potto.query import Database
 from potto.syntax import nodes
 from potto.syntax.typesetting import broken, unicode
@@ -142,11 +144,11 @@ def _surfaces(db: Database, term: Term, fields: Rewrite) -> dict[str, None]:
 
 def derivative_facts(db: Database, file: str, name: str) -> DerivativeFacts | None:
     """The derivative of a definition in symbols; None for one that is not a function."""
-    whole = core(db, file, name).term
+    at, whole = (file, name), core(db, file, name).term
     term, type = whole, interface(db, file, name).type
     while isinstance(term, Deriv | Global):
         if isinstance(term, Global):
-            type = interface(db, term.module, term.name).type
+            at, type = (term.module, term.name), interface(db, term.module, term.name).type
             term = core(db, term.module, term.name).term
         else:
             term = term.function
@@ -158,7 +160,7 @@ def derivative_facts(db: Database, file: str, name: str) -> DerivativeFacts | No
     type = interface(db, file, name).type
     derived = format_type(derivative_type(type))
     found = describe(term, name, derived, lambda g: core(db, g.module, g.name).term, fields)
-    return DerivativeFacts(
+    facts = DerivativeFacts(
         name,
         format_type(type),
         derived,
@@ -170,6 +172,7 @@ def derivative_facts(db: Database, file: str, name: str) -> DerivativeFacts | No
         tuple(sorted(found.tangents)),
         found.divisors,
     )
+    return as_the_program_writes(facts, definition(db, *at))
 
 
 def _unless_recursive(db: Database, target: Global) -> Term | None:
@@ -188,5 +191,5 @@ def _body_facts(term: Term, found: DerivativeText, fields: Rewrite) -> PartFacts
     while isinstance(term, Lam):
         term = term.body
     interior = "" if found.integrals else found.smooth
-    return PartFacts(format_term(fields(unguarded(term)[0])), interior, found.deltas, (), "; ".join(found.problems),
-                     found.continuous)  # fmt: skip
+    value = format_term(fields(as_written(unguarded(term)[0])))
+    return PartFacts(value, interior, found.deltas, (), "; ".join(found.problems), found.continuous)

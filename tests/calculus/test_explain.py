@@ -39,7 +39,7 @@ def test_equation_two_of_the_paper() -> None:
 def test_the_delta_integrated_out() -> None:
     (item,) = explain(RENDERER, "renderer").integrals
     (boundary,) = item.boundary
-    assert boundary.startswith("integral [0, 1] shader(x, -c - x)(c)*dc*[")
+    assert boundary.startswith("dc*(integral [0, 1] shader(x, -c - x)(c)*[")
 
 
 def test_surfaces_say_what_moves_them_and_where_they_are() -> None:

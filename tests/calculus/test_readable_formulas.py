@@ -70,7 +70,7 @@ def test_conditions_that_say_nothing_are_not_shown(program: str, conditions: str
     library = Library()
     file = library.put("<text>", program + "\n")
     shown = str(derivative_facts(library.db, file, "f"))
-    assert f"dt*{conditions}" in shown
+    assert f"dt*{conditions}" in shown or f"dt*(integral [0, 1] {conditions} d(y))" in shown
     assert "0 = 0" not in shown and "0 >= 0" not in shown and "1 = 0" not in shown
 
 
@@ -105,9 +105,9 @@ def test_what_has_two_bounds_stands_between_them(condition: str, read: str) -> N
 @pytest.mark.parametrize(
     ("program", "read"),
     [
-        ("def f(t) integral ([0, 1], [0, 1]) [x*y < t] d(x, y)", "dt/x*[t > 0 and t < x]"),
+        ("def f(t) integral ([0, 1], [0, 1]) [x*y < t] d(x, y)", "dt*(integral [0, 1] 1/x*[t > 0 and t < x] d(x))"),
         ("def f(t) integral ([0, 1], [0, 1]) [x*(y - t) < 0] d(x, y)", "dt*[t > 0 and t < 1]"),
-        ("def f(t) integral ([-1, 0], [0, 1]) [x*y > t] d(x, y)", "dt/x*[t < 0 and x < t]"),
+        ("def f(t) integral ([-1, 0], [0, 1]) [x*y > t] d(x, y)", "dt*(integral [-1, 0] 1/x*[t < 0 and x < t] d(x))"),
     ],
 )
 def test_factors_whose_sign_is_known_inside_an_integral_are_left_out(program: str, read: str) -> None:
@@ -120,7 +120,7 @@ def test_a_sign_that_conditions_tell_is_not_written() -> None:
     """The edges of abs(x - 1/2) < a move apart; that there are two is asked of a, and so is the sign of each slope."""
     library = Library()
     file = library.put("<text>", "def f(a) integral [0, 1] [abs(x - 1/2) < a]*x d(x)\n")
-    assert explain_derivative(library.db, file, "f").tangent == "da*[a > 0 and a < 0.5]"
+    assert explain_derivative(library.db, file, "f").tangent == "da*[a > 0 and a < 1/2]"
 
 
 @pytest.mark.parametrize(
@@ -128,7 +128,7 @@ def test_a_sign_that_conditions_tell_is_not_written() -> None:
     [
         ("def f(t) integral ([0, 1], [0, x]) [x < t] d(x, y)", "t*dt*[t > 0 and t < 1]"),
         ("def f(t) integral ([0, 1], [x, 1]) [x^2 + y^2 < t]*y d(x, y)",
-         "integral [0, 1] dt/2*[2*x^2 < t and t < x^2 + 1] d(x)"),
+         "dt/2*(integral [0, 1] [2*x^2 < t and t < x^2 + 1] d(x))"),
     ],
 )  # fmt: skip
 def test_what_an_integral_does_not_depend_on_is_not_integrated(program: str, read: str) -> None:
@@ -142,7 +142,7 @@ def test_what_both_sides_of_a_choice_share_stands_before_it() -> None:
     library = Library()
     file = library.put("<text>", "def f(t, s) integral [0, 1] (if [x < 1/2] then x*exp(-t*x) else 3*exp(-t*x)) d(x)\n")
     shown = explain_derivative(library.db, file, "f").tangent
-    assert shown == "-(integral [0, 1] x*exp(-t*x)*(if [x < 0.5] then x else 3)*dt d(x))"
+    assert shown == "-dt*(integral [0, 1] x*exp(-t*x)*(if [x < 1/2] then x else 3) d(x))"
 
 
 def test_what_all_summands_are_multiples_of_is_cancelled() -> None:
@@ -217,7 +217,7 @@ def test_the_state_of_a_fold_has_the_fields_of_the_first_one() -> None:
 @pytest.mark.parametrize(
     ("program", "read"),
     [
-        ("sum i in 1..5 (integral [0, 1] [x*abs(i) < t/i] d(x))", "sum i in 1..5 (dt/i^2*[t < i^2 and t > 0])"),
+        ("sum i in 1..5 (integral [0, 1] [x*abs(i) < t/i] d(x))", "sum i in 1..5 (dt/i^2*[t > 0 and t < i^2])"),
         ("sum i in -5..-1 (integral [0, 1] [x*i < t] d(x))", "sum i in -5..-1 (-dt/i*[t < 0 and i < t])"),
         ("sum i in -1..5 (integral [0, 1] [x*i < t] d(x))", "sum i in -1..5 (dt/abs(i)*[t*i > 0 and t/i < 1])"),
         ("sum i in 1..5 (sum j in i..9 (integral [0, 1] [j*x < t] d(x)))",
@@ -250,7 +250,7 @@ def test_what_differs_between_two_choices_is_one(program: str, read: str) -> Non
 @pytest.mark.parametrize(
     ("body", "read"),
     [
-        ("integral [0, 2] [t*x > 1] d(x)", "dt/t^2*[1/t < 2 and t > 0]"),
+        ("integral [0, 2] [t*x > 1] d(x)", "dt/t^2*[t > 0 and 1/t < 2]"),
         ("(integral [0, 1] [v*x < t] d(x))*[v > 0]", "(dt/v - t*dv/v^2)*[v > 0 and t*v > 0 and t/v < 1]"),
         ("integral [0, 1] [v*x^2 < t]*[v > 0] d(x)", "(dt/v - t*dv/v^2)/(2*sqrt(t/v))"),
     ],

@@ -68,9 +68,10 @@ def _apart(node: If | Branch, tangents: frozenset[str]) -> Term:
         if n * m > 0:
             shared.times(base, min(n, m, key=size_of))
     shared.exponents = [e for e in one.exponents if e in other.exponents]
-    if not (shared.powers or shared.exponents or shared.conditions):
+    alike = abs(one.coefficient) == abs(other.coefficient)
+    if not (shared.powers or shared.exponents or shared.conditions or (alike and abs(one.coefficient) != 1)):
         return node
-    if abs(one.coefficient) == abs(other.coefficient):
+    if alike:
         shared.coefficient = max(one.coefficient, other.coefficient)
     elif one.coefficient < 0 and other.coefficient < 0:
         shared.coefficient = Fraction(-1)

@@ -85,7 +85,7 @@ def fewer(known: Iterable[Inequality], box: Box = _ANYWHERE) -> list[Inequality]
 def bracket(known: Sequence[Inequality]) -> Term:
     """1 where all conditions hold, else 0."""
     whole: Term = ONE
-    for item in between(known):  # the last one is the first that is asked
+    for item in reversed(between(known)):  # the first one is asked first
         whole = branch((item.surface,), item.strict, whole, ZERO)
     return whole
 
@@ -101,8 +101,8 @@ class _Bound(Struct, frozen=True):
 
 
 def between(known: Sequence[Inequality]) -> list[Inequality]:
-    """The same conditions: two bounds of one thing alike and beside each other, so that it stands between them, the
-    lower one last, which is asked first; and none of a fraction of anything."""
+    """The same conditions in their order: two bounds of one thing alike and beside each other, the lower one first, so
+    that it stands between them; and none of a fraction of anything."""
     bounds = [_bound(item.surface) for item in known]
     found: list[Inequality] = []
     done: set[int] = set()
@@ -111,7 +111,7 @@ def between(known: Sequence[Inequality]) -> list[Inequality]:
             continue
         alike = [(j, b) for j, b in enumerate(bounds) if b and bound and b.of == bound.of]
         surfaces = {j: _surface(b) for j, b in alike if b.scaled or len(alike) > 1}
-        for j in [j for j, b in alike if b.turned] + [j for j, b in alike if not b.turned] or [i]:
+        for j in [j for j, b in alike if not b.turned] + [j for j, b in alike if b.turned] or [i]:
             surface = surfaces.get(j)
             found.append(known[j] if surface is None else Inequality(surface, known[j].strict))
             done.add(j)

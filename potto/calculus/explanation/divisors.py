@@ -13,7 +13,7 @@ from potto.calculus.explanation.brackets import Inequality, conditions, implies
 from potto.calculus.explanation.factors import factored
 from potto.calculus.explanation.symbols import Formula, Words
 from potto.core.simplify import normalized_surface
-from potto.core.terms import Branch, If, Prim, Term, children, neg, postorder, prim, sub
+from potto.core.terms import Branch, Const, If, Prim, Proj, Term, Var, children, neg, postorder, prim, sub
 from potto.primitives import PRIMITIVES
 
 Known = tuple[Inequality, ...]
@@ -39,13 +39,18 @@ def _divisors(formula: Term, names: frozenset[str], original: Iterable[Term], kn
         for base, n in factored(term).powers.items():
             whole = n > 0 and n.denominator == 1  # where a root is 0 that it divides by, there is no derivative either
             inner = base.args[0] if isinstance(base, Prim) and base.op == "abs" else base
-            apart = whole and inner.free and inner.free <= names and range_of(inner).zero
+            apart = whole and inner.free and inner.free <= names and _is_plain(inner) and range_of(inner).zero
             if apart and not any(_keeps_apart(item, inner) for item in held):
                 found.setdefault(normalized_surface(inner)[0], inner)
     if not found:
         return ()
     singular = {normalized_surface(base)[0] for term in original for base in _singular(term)}
     return tuple([base for canonical, base in found.items() if canonical not in singular])
+
+
+def _is_plain(term: Term) -> bool:
+    """Whether a reader sees where it is 0."""
+    return all(isinstance(node, Const | Var | Prim | Proj) for node in postorder(term))
 
 
 def _divided(term: Term, known: Known) -> Iterator[tuple[Term, Known]]:

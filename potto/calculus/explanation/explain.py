@@ -25,6 +25,7 @@ from potto.calculus.explanation.continuity import continuous
 from potto.calculus.explanation.decimals import in_decimals
 from potto.calculus.explanation.divisors import divided_by
 from potto.calculus.explanation.fields import fields_of
+from potto.calculus.explanation.fractions import as_the_program_writes
 from potto.calculus.explanation.layout import DerivativeText, IntegralText, SurfaceText
 from potto.calculus.explanation.plain_names import Each, apart, plainly_indexed, plainly_named
 from potto.calculus.explanation.readable import ReadableParts, readable
@@ -61,6 +62,7 @@ from potto.core.terms import (
 )
 from potto.diagnostics import PottoError
 from potto.elaborate import core_term
+from potto.modules import definition
 from potto.query import Database
 from potto.types import Type, derivative_type, format_type, groups_of, interface
 
@@ -86,10 +88,14 @@ def explain_derivative(db: Database, file: str, name: str) -> DerivativeText:
             fields_of(db, known),
             db.give_way,
         )
-        return replace(text, by=name)
+        where = (of.module, of.name) if isinstance(of, Global) else (file, name)
+        return as_the_program_writes(replace(text, by=name), definition(db, *where))
     given = _applied(term, found.type)
     type_text = format_type(derivative_type(found.type))
-    return describe(given, name, type_text, resolve, fields_of(db, found.type), db.give_way)
+    text = describe(given, name, type_text, resolve, fields_of(db, found.type), db.give_way)
+    while isinstance(term, Global):  # another name for it
+        file, name, term = term.module, term.name, resolve(term)
+    return as_the_program_writes(text, definition(db, file, name))
 
 
 def _original(term: Term, name: str, resolve: Resolve) -> tuple[Term, str] | None:

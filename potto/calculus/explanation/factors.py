@@ -25,6 +25,7 @@ from potto.core.terms import (
     Const,
     Delta,
     Index,
+    Integral,
     Prim,
     Proj,
     Term,
@@ -40,7 +41,7 @@ from potto.core.terms import (
 )
 
 _HALF = Fraction(1, 2)
-_PLAIN, _TANGENT, _DELTA = range(3)
+_PLAIN, _TANGENT, _INTEGRAL, _DELTA = range(4)
 _DIGITS = 15
 _FEW = 6  # digits of a number that a person has written
 _LARGEST_DIVISOR = 1000
@@ -218,7 +219,7 @@ def _signed(found: Factors, sign: Prim) -> None:
 
 
 def written(found: Factors, tangents: frozenset[str]) -> Term:
-    """The product: numbers, factors, tangents, brackets, deltas, over what it is divided by."""
+    """The product: numbers, factors, tangents, integrals, brackets, deltas, over what it is divided by."""
     if not found.coefficient:
         return ZERO
     found = _tidied(found)
@@ -235,10 +236,12 @@ def written(found: Factors, tangents: frozenset[str]) -> Term:
     tail = [_raised(b, found.powers[b]) for b in top if place[b][0] != _PLAIN]
     held = [bracket(found.conditions)] if found.conditions else []
     deltas = [b for b in tail if _place(b, tangents) == _DELTA]
-    moving = [b for b in tail if b not in deltas]
+    integrals = [_raised(b, found.powers[b]) for b in top if place[b][0] == _INTEGRAL]
+    moving = [b for b in tail if b not in (*deltas, *integrals)]
     under = [divisor, *_powers(found, below, -1)]
-    fraction = div(mul(scale, *above, *moving), mul(*under))
-    whole = mul(fraction, *held, *deltas)
+    halved = [] if above or moving else integrals  # half of an integral, but dt/2 times one
+    fraction = div(mul(scale, *above, *moving, *halved), mul(*under))
+    whole = mul(fraction, *(integrals if not halved else ()), *held, *deltas)
     return neg(whole) if found.coefficient < 0 else whole
 
 
@@ -280,6 +283,8 @@ def _place(base: Term, tangents: frozenset[str]) -> int:
     if isinstance(base, Delta) or (isinstance(base, App) and isinstance(base.function, Var)
                                    and base.function.name.startswith("delta'")):  # fmt: skip
         return _DELTA
+    if isinstance(base, Integral):
+        return _INTEGRAL
     moves = is_tangent(base, tangents) or (isinstance(base, Prim) and base.op == "add" and base.free & tangents)
     return _TANGENT if moves else _PLAIN
 

@@ -37,6 +37,7 @@ from potto.core.terms import (
     Prim,
     Sum,
     Term,
+    Var,
     add,
     branch,
     children,
@@ -132,7 +133,7 @@ def _undecided(node: Term, known: Mapping[Term, Term], box: Box, work: _Work) ->
             new = branch((surface,), new.strict, new.then, new.orelse)
         held = conditions(new) if box else None
         if held is not None and set(plain := fewer(held, box)) != set(held):
-            new = bracket_of(plain[::-1])  # the outermost is asked first
+            new = bracket_of(plain)
     return new if new is node else work.node(new)
 
 
@@ -185,10 +186,8 @@ class _Work:
                 return substitute(node.body, {node.variable: node.lo}) if lo == hi else ZERO
             case If():
                 return in_one(node, self.tangents, self.inside, self._cost)
-            case Integral(body=Prim(op="neg", args=(inner,))):
-                return neg(with_integrand(node, inner))
             case Integral():
-                return self._over_few(node)
+                return self._in_front(self._over_few(node))
             case _:
                 return node
 
@@ -207,6 +206,21 @@ class _Work:
             return body
         variables, bounds, hints = zip(*left, strict=True)
         return self.node(integral(variables, bounds, body, hints))
+
+    def _in_front(self, node: Term) -> Term:
+        """An integral with the number, the tangents and the names that its integrand is a multiple of in front."""
+        if not isinstance(node, Integral):
+            return node
+        found = self._factored(node.body)
+        still = {base: n for base, n in found.powers.items() if base.free.isdisjoint(node.variables)}
+        fixed = {base: n for base, n in still.items() if n > 0 and n.denominator == 1
+                 and (isinstance(base, Var) or is_tangent(base, self.tangents))}  # fmt: skip
+        if not fixed and found.coefficient == 1:
+            return node
+        rest = {base: n for base, n in found.powers.items() if base not in fixed}
+        inner = written(Factors(Fraction(1), rest, found.exponents, found.conditions), self.tangents)
+        whole = Factors(found.coefficient, {with_integrand(node, inner): 1, **fixed}, [], [])
+        return written(whole, self.tangents)
 
     def _shortest(self, node: Prim) -> Term:
         """The shortest of: the product of its factors, and the node expanded, with the sums in it or around them."""

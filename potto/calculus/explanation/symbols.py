@@ -14,6 +14,7 @@ from msgspec import Struct
 from potto.calculus.algebra.radicals import NAN
 from potto.calculus.algebra.ranges import Box
 from potto.calculus.differentiation.root_names import RootNames
+from potto.calculus.explanation.bound_names import as_written, named_alike
 from potto.calculus.explanation.decimals import in_decimals
 from potto.calculus.explanation.guarded import guarded
 from potto.calculus.explanation.readable import ReadableParts, readable
@@ -77,7 +78,7 @@ class Words(Struct, frozen=True):
 
     def plain(self, term: Term) -> str:
         """A term as it is written, parts of records by their names."""
-        return format_term(simplify(in_decimals(self.fields(term))))
+        return format_term(simplify(in_decimals(self.fields(as_written(term, self.names)))))
 
     def condition(self, term: Term) -> str:
         """A comparison as people write it: `s > 0` for -s < s."""
@@ -114,7 +115,8 @@ class Words(Struct, frozen=True):
         strangers = {name for name in plain.free - known if name.rstrip("'") != "delta"}  # `delta'`: its derivative
         if strangers:
             raise NoFormula(f"where it jumps depends on `{min(strangers)}`, over which it is summed")
-        return readable(simplify(self.fields(plain)), self.tangents, box, self.progress)
+        alike = named_alike(plain, self.names.union(inside, self.roots.meanings))
+        return readable(simplify(self.fields(alike)), self.tangents, box, self.progress)
 
     @staticmethod
     def _written(term: Term) -> str:
@@ -179,7 +181,7 @@ def without_guards(term: Term) -> Term:
 def _factored(node: Term) -> Term:
     """What is 0 elsewhere as a product with a bracket."""
     if isinstance(node, Branch) and node.orelse is ZERO and node.then is not ONE and not isinstance(node.then, Tuple):
-        return mul(node.then, branch(node.coordinates, node.strict, ONE, ZERO))
+        return mul(branch(node.coordinates, node.strict, ONE, ZERO), node.then)
     return node
 
 
