@@ -25,7 +25,9 @@ local function show_values(buffer)
   if vim.lsp.inlay_hint and vim.lsp.inlay_hint.enable then
     vim.lsp.inlay_hint.enable(true, { bufnr = buffer })
   end
-  if vim.lsp.codelens then
+  if vim.lsp.codelens and vim.lsp.codelens.enable then -- 0.12, which keeps them itself
+    vim.lsp.codelens.enable(true, { bufnr = buffer })
+  elseif vim.lsp.codelens then
     vim.api.nvim_create_autocmd({ "BufEnter", "InsertLeave", "BufWritePost" }, {
       buffer = buffer,
       callback = function()
@@ -35,7 +37,20 @@ local function show_values(buffer)
   end
 end
 
-local clients = {} -- by root
+local clients = {} -- by root, in 0.7
+
+--- Attach a buffer to the client of its root, which is started if there is none. The client, if it could be.
+local function start(config, buffer)
+  if vim.lsp.start then -- 0.8
+    return vim.lsp.start(config, { bufnr = buffer })
+  end
+  local id = clients[config.root_dir]
+  if not id or not vim.lsp.get_client_by_id(id) then
+    id = vim.lsp.start_client(config)
+    clients[config.root_dir] = id
+  end
+  return id and vim.lsp.buf_attach_client(buffer, id) and id
+end
 
 local function attach(buffer, options)
   local name = vim.api.nvim_buf_get_name(buffer)
@@ -43,23 +58,17 @@ local function attach(buffer, options)
     return
   end
   local root = root_of(name)
-  local id = clients[root]
-  if not id or not vim.lsp.get_client_by_id(id) then
-    local capabilities = vim.lsp.protocol.make_client_capabilities()
-    id = vim.lsp.start_client({
-      name = "potto",
-      cmd = options.cmd,
-      root_dir = root,
-      workspace_folders = { { uri = vim.uri_from_fname(root), name = root } },
-      settings = options.settings,
-      init_options = options.settings,
-      capabilities = capabilities,
-      on_attach = options.on_attach,
-    })
-    clients[root] = id
-  end
+  local id = start({
+    name = "potto",
+    cmd = options.cmd,
+    root_dir = root,
+    workspace_folders = { { uri = vim.uri_from_fname(root), name = root } },
+    settings = options.settings,
+    init_options = options.settings,
+    capabilities = vim.lsp.protocol.make_client_capabilities(),
+    on_attach = options.on_attach,
+  }, buffer)
   if id then
-    vim.lsp.buf_attach_client(buffer, id)
     show_values(buffer)
   end
 end

@@ -25,3 +25,21 @@ def test_a_session(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     assert "if [x + c > 0.5] then 1 else 0" in found["fixed"]
     assert float(found["value"].split()[0]) == pytest.approx(math.pi / 16, rel=1e-8)  # a quarter of a disc
     assert found["groups"][:4] == ["pottoDefine", "pottoFunction", "pottoIntegral", "pottoConditional"]
+
+
+TODAY = ["start", "inlay_hint.enable", "codelens.enable"]
+
+
+@pytest.mark.parametrize(
+    ("today", "called"),
+    [("1", [*TODAY, *TODAY]), ("0", ["start_client", "buf_attach_client", "buf_attach_client", "codelens.refresh"])],
+)
+def test_functions_that_newer_versions_give_up_are_called_in_older_ones_alone(
+    run: Run, monkeypatch: pytest.MonkeyPatch, today: str, called: list[str]
+) -> None:
+    """`start_client` is given up since 0.11, `codelens.refresh` since 0.12: stand-ins note which ones are called. One
+    client serves both files of a folder."""
+    monkeypatch.setenv("POTTO_EDITORS", str(EDITORS))
+    monkeypatch.setenv("POTTO_TODAY", today)
+    said = run("nvim", "--clean", "--headless", "-c", f"luafile {SESSION.with_name('neovim_names.lua')}", "-c", "cquit")
+    assert json.loads(said.partition("FOUND")[2].splitlines()[0]) == called
