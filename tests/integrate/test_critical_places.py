@@ -314,3 +314,17 @@ def test_a_jump_keeps_its_place_beside_a_double_root(t: float) -> None:
     answer = f((t, 1.0))
     assert abs(answer.value - value) <= answer.error <= 1e-11
     assert abs(answer.tangent - slope) <= answer.tangent_error <= 1e-11
+
+
+@pytest.mark.parametrize("unit", [1.0, 1e-4, 1e-8, 1e-20, 1e8])
+@pytest.mark.parametrize(
+    ("curve", "lo", "hi", "area"),
+    [("x^3 + y^3 - 3*t*x*y < 0", 0, 3.3, 1.5), ("y^2*t < x^3 - x*t^2 and x < 0", -2, 2, mp.beta(0.75, 1.5))],
+    ids=["a loop with a double point", "an oval beside a branch"],
+)
+def test_a_curve_in_any_unit_of_length(curve: str, lo: float, hi: float, area: Any, unit: float) -> None:
+    """Areas go as t^2. Of Descartes' leaf it is 3/2, of the oval twice the integral of sqrt(x - x^3) over [0, 1]."""
+    side = f"[{lo * unit!r}, {hi * unit!r}]"
+    answer = derivative(f"def f(t) integral ({side}, {side}) [{curve}] d(x, y)", t=unit)
+    holds(answer, area * unit**2, 2 * area * unit, 1e-10)
+    assert answer.converged

@@ -52,6 +52,7 @@ def critical_rows(
     """
     low, high = as_array(np.minimum(lo.v, hi.v), batch), as_array(np.maximum(lo.v, hi.v), batch)
     around = BEYOND * np.where(np.isfinite(high - low), high - low, 0.0)
+    reach = np.minimum(1.0, np.maximum(np.abs(low), np.abs(high)))
     rows: list[Row] = []
     same = SAME * np.where(np.isfinite(high - low), high - low, 1.0)
     systems, env = _in_numbers(systems, env)
@@ -61,7 +62,9 @@ def critical_rows(
     for group in groups:
         wide = [around if system.turning else 0.0 * around for system in group.systems]
         ends = low - np.stack(wide), high + np.stack(wide)
-        search = _Search(group.names, group.fixed(env, batch), *group.parts(), near, len(group.systems))
+        count = len(group.systems)
+        ones = np.ones((len(group.names), batch * count))
+        search = _Search(group.names, group.fixed(env, batch), *group.parts(), near, count, ones)
         owner, places, width = search.solved(ends[0].ravel(), ends[1].ravel(), machine.search)
         lost.append(len(search.lost))
         for number, system in enumerate(group.systems):
@@ -71,7 +74,8 @@ def critical_rows(
             whose, there, off = owner[own] % batch, places[:, own], width[own]
             t, et = np.zeros((2, machine.directions if system.steps else 0, own.size))
             if t.size:
-                t, et = _speeds(system, variable, env, whose, there, off, machine)
+                doubt = 8 * EPS + off / np.maximum(reach[whose], np.abs(there[0]))
+                t, et = _speeds(system, variable, env, whose, there, doubt, machine)
             rows += _as_rows(system, whose, there[0], off, same, batch, (t, et))
     for _ in range(sum(lost)):
         machine.note(Unsearched(variable))
@@ -166,9 +170,9 @@ def _by_itself(term: Term, place: int) -> SameShape:
 
 
 def _speeds(
-    system: Critical, variable: str, env: dict[str, Value], owner: Ints, places: Array, width: Array, machine: Any
+    system: Critical, variable: str, env: dict[str, Value], owner: Ints, places: Array, doubt: Array, machine: Any
 ) -> tuple[Array, Array]:
-    """How solutions move along the variable that is cut, (k, P), and by how much that may be off."""
+    """How solutions move along the variable that is cut, (k, P), and by how much that may be off: `doubt` as a part."""
     names = (variable, *(w.variable for w in system.within))
     k, n = machine.directions, len(names)
     here = {name: pad(value, k + n) for name, value in gather(env, owner).items()}
@@ -183,7 +187,6 @@ def _speeds(
     inverse = _inverse(matrices)
     moves = -inverse @ rates
     sizes = np.abs(inverse) @ (np.abs(rates) + np.abs(matrices) @ np.abs(moves))
-    doubt = 8 * EPS + width / np.maximum(1.0, np.abs(places[0]))
     return moves[:, 0].T, sizes[:, 0].T * doubt
 
 
@@ -195,6 +198,7 @@ class _Search(Struct):
     """A search for all solutions, over boxes (n, 2, P): the variable that is cut, then those further in.
 
     count: of systems, which have as many members each, in order. lost: those whose solutions are not all known.
+    reach: how far from 0 what is searched goes, (n, members); 1 where it goes farther.
     """
 
     names: tuple[str, ...]
@@ -204,6 +208,7 @@ class _Search(Struct):
     ends: Sequence[Term]
     near: Ranges
     count: int
+    reach: Array
     found: list[tuple[Ints, Array, Array]] = []
     lost: set[int] = set()
 
@@ -211,6 +216,7 @@ class _Search(Struct):
         """Whose the solutions are, where they are, and how far off along the variable that is cut; not all of systems
         with too many boxes. within: whether so many more of them are within the budget."""
         owner, box = self.whole(low, high)
+        self.reach[:, owner] = np.minimum(1.0, np.abs(box).max(axis=1))
         each = low.size // self.count
         most = max(BOXES, BOXES_EACH * each)
         tiny = FINEST * (high - low)
@@ -244,7 +250,7 @@ class _Search(Struct):
     def told(self, owner: Ints, box: Array) -> tuple[Ints, Array]:
         """The boxes in which rounding tells places from one another; the others are left, as places that are so far
         off: parts of them would say nothing more."""
-        size = (box[:, 1] - box[:, 0]) / np.maximum(1.0, np.abs(box).max(axis=1))
+        size = (box[:, 1] - box[:, 0]) / self.place(owner, box)
         short = np.nonzero((size[0] <= FLAT) & (size[1:] <= ROUNDED).all(axis=0))[0]
         if not short.size:
             return owner, box
@@ -295,7 +301,7 @@ class _Search(Struct):
         if not owner.size:
             return owner, box, side[0]
         with np.errstate(all="ignore"):
-            more = INFLATED * side + ROUNDED * np.maximum(1.0, np.abs(box).max(axis=1))
+            more = INFLATED * side + ROUNDED * self.place(owner, box)
             wide = np.stack((box[:, 0] - more, box[:, 1] + more), axis=1)
             step = self.step(owner, wide)
             known = np.isfinite(step).all(axis=(0, 1)) & np.isfinite(wide).all(axis=(0, 1))
@@ -340,11 +346,16 @@ class _Search(Struct):
                     break
         self.found.append((owner, 0.5 * (box[:, 0] + box[:, 1]), 0.5 * (box[0, 1] - box[0, 0])))
 
+    def place(self, owner: Ints, box: Array) -> Array:
+        """How far from 0 boxes are, (n, P), or what is searched where they lie about it: rounding is a part of it."""
+        place: Array = np.maximum(self.reach[:, owner], np.abs(box).max(axis=1))
+        return place
+
     def halved(self, owner: Ints, box: Array) -> tuple[Ints, Array]:
         """Boxes halved along all sides that rounding leaves while they are few, else each along its longest."""
         n = box.shape[0]
         every = owner.size <= FEW * self.count
-        size = (box[:, 1] - box[:, 0]) / np.maximum(1.0, np.abs(box).max(axis=1))
+        size = (box[:, 1] - box[:, 0]) / self.place(owner, box)
         sides = ~(size <= ROUNDED)
         longest = np.where(np.isnan(size), np.inf, size).argmax(axis=0)
         for i in range(n):
