@@ -4,10 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import pytest
 from lsp_client import Client
+from potto_lsp import evaluator
+
+from potto.applications import integral_answers
+from potto.evaluating.world import World
+from potto.modules import files
+from potto.modules.folders import list_folder
 
 Server = Callable[..., Client]
 Uri = Callable[[str], str]
@@ -73,3 +80,37 @@ def test_the_page_comes_from_the_server(server: Server) -> None:
     found = server().ask("potto/viewPage", {})
     assert set(found) == {"body", "style", "script"} and 'id="sliders"' in found["body"]
     assert "http:" not in found["script"] and "https:" not in found["script"]
+
+
+def test_the_workspace_is_not_listed_for_each_place_of_a_slider(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "main.po").write_text(PROGRAM)
+    world = World()
+    file = world.key(tmp_path / "main.po")
+    listed: list[str] = []
+    monkeypatch.setattr(files, "list_folder", lambda folder: listed.append(folder) or list_folder(folder))
+    refreshed: list[bool] = []
+    refresh = world.refresh
+    monkeypatch.setattr(world, "refresh", lambda: refreshed.append(True) or refresh())
+    monkeypatch.setattr(integral_answers, "UNSEEN", 1e9)
+
+    def look(t: float, quick: bool) -> Any:
+        question = {"name": "left", "values": {"t": t}, "wrt": "t", "which": 0, "quick": quick}
+        task = {
+            "do": "view",
+            "file": file,
+            "text": "/look",
+            "roots": [str(tmp_path)],
+            "texts": {},
+            "question": question,
+        }
+        return evaluator._answer(world, task)["result"]
+
+    assert look(0.25, False)["numbers"]["value"] == pytest.approx(math.expm1(0.25), rel=1e-12)
+    before = len(listed), len(refreshed)
+    for place in range(5):
+        assert "svg" in look(0.25 + place / 10, True)
+    assert (len(listed), len(refreshed)) == before
+    look(0.25, False)
+    assert len(refreshed) == before[1] + 1
