@@ -42,7 +42,7 @@ def standing_in_the_way(db: Database, file: str, node: nodes.Expr | nodes.Statem
     """
     found: dict[Located, Way] = {}
     seen: set[DefinitionTarget] = set()
-    queue: list[tuple[str, Reference, Way]] = [(file, reference, ()) for reference in references_in(node)]
+    queue: list[tuple[str, Reference, Way]] = [(file, reference, ()) for reference in references_in(node).every]
     for at, (path, name), way in queue:
         target = refer(db, at, path, name)
         if isinstance(target, DefinitionTarget):

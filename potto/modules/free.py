@@ -6,7 +6,7 @@ recursion. Knows no files. Of types those of records are free: `Real[x]` talks a
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from potto.quick import quick, value
@@ -28,8 +28,19 @@ Reference = tuple[str | None, str]
 _Step = Node | Statement | _Bind | _Unbind
 
 
-def free_references(root: Node | Statement) -> Iterator[nodes.Name | nodes.Member]:
-    """The names and the members of modules that occur free in `root`, one by one, in the order of the text."""
+@value
+class References:
+    """What a piece of syntax refers to: `(None, name)` or `(path, name)`, in the order of the text, each once. With
+    those that it only calls, all arguments by their places, is nothing else done."""
+
+    every: tuple[Reference, ...] = ()
+    only_called: frozenset[Reference] = frozenset()
+
+
+def free_references(root: Node | Statement, called: set[int] | None = None) -> list[nodes.Name | nodes.Member]:
+    """The names and the members of modules that occur free in `root`, one by one, in the order of the text. `called`
+    takes the identities of nodes that are called with all arguments by their places."""
+    found: list[nodes.Name | nodes.Member] = []
     bound: dict[str, int] = {}
     stack: list[_Step] = [root]
     while stack:
@@ -37,7 +48,7 @@ def free_references(root: Node | Statement) -> Iterator[nodes.Name | nodes.Membe
         kind = type(step)
         if kind is nodes.Name:
             if not bound.get(step.id):
-                yield step
+                found.append(step)
         elif kind is _Bind:
             for name in step.names:
                 bound[name] = bound.get(name, 0) + 1
@@ -46,17 +57,27 @@ def free_references(root: Node | Statement) -> Iterator[nodes.Name | nodes.Membe
                 bound[name] -= 1
         elif kind is nodes.Member:
             if not bound.get(step.path.partition(".")[0]):
-                yield step
+                found.append(step)
         else:
+            if kind is nodes.Apply and called is not None and all(each.name is None for each in step.arguments):
+                called.add(id(step.function))
             steps = _STEPS.get(kind)
             if steps is not None:
                 stack.extend(reversed(steps(step)))
+    return found
 
 
-def references_in(root: Node | Statement) -> tuple[Reference, ...]:
-    """The free references in `root` as `(None, name)` and `(path, name)`, in the order of the text, each once."""
-    found = free_references(root)
-    return tuple(dict.fromkeys([(None, r.id) if isinstance(r, nodes.Name) else (r.path, r.name) for r in found]))
+def references_in(root: Node | Statement) -> References:
+    """The free references in `root`."""
+    called: set[int] = set()
+    found = [(_reference(each), id(each) in called) for each in free_references(root, called)]
+    every = tuple(dict.fromkeys([reference for reference, _ in found]))
+    otherwise = {reference for reference, is_called in found if not is_called}
+    return References(every, frozenset([reference for reference in every if reference not in otherwise]))
+
+
+def _reference(node: nodes.Name | nodes.Member) -> Reference:
+    return (None, node.id) if isinstance(node, nodes.Name) else (node.path, node.name)
 
 
 def free_names(root: Item | Expr | nodes.Binding) -> frozenset[str]:
@@ -206,4 +227,4 @@ _STEPS: dict[type, Callable[[Any], Sequence[_Step]]] = {
 }
 
 
-quick(_Bind, _Unbind)
+quick(_Bind, _Unbind, References)

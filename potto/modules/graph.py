@@ -92,7 +92,7 @@ def import_cycle(db: Database, file: str) -> tuple[str, ...]:
 def references(db: Database, file: str, name: str) -> tuple[Reference, ...]:
     """The names `(None, name)` and members `(path, name)` that a definition refers to, in order, each once."""
     text = chunk_text(db, file, name)
-    return () if text is None else chunk_references(db, text, is_diffeo(file))
+    return () if text is None else chunk_references(db, text, is_diffeo(file)).every
 
 
 @query

@@ -14,7 +14,7 @@ from collections.abc import Mapping
 from itertools import accumulate
 from typing import Any, Literal
 
-from potto.modules.free import Reference, references_in
+from potto.modules.free import References, references_in
 from potto.modules.grouping import grouped
 from potto.query import Database, Parted, query
 from potto.quick import quick, replace, value
@@ -189,10 +189,10 @@ def _described(text: str) -> Head | None:
 
 
 @query(keep=2048)
-def chunk_references(db: Database, text: str, diffeo: bool) -> tuple[Reference, ...]:
-    """What a chunk refers to, as `references_in` says it."""
+def chunk_references(db: Database, text: str, diffeo: bool) -> References:
+    """What a chunk refers to. Keyed by the text alone: who is analysed again has not to be walked through again."""
     item = parsed(db, text, diffeo).item
-    return () if item is None else references_in(item)
+    return References() if item is None else references_in(item)
 
 
 @value

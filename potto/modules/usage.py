@@ -55,7 +55,7 @@ def occurring_in_piece(db: Database, text: str, diffeo: bool) -> frozenset[str]:
 def occurring_names(db: Database, text: str, diffeo: bool) -> frozenset[str]:
     """The free names of a chunk, and its modules with all that is in front of a dot in them."""
     found: set[str] = set()
-    _collect(chunk_references(db, text, diffeo), found)
+    _collect(chunk_references(db, text, diffeo).every, found)
     if "#>" in text:
         for live in live_expressions(text):
             found |= names_in(live.text)
@@ -68,7 +68,7 @@ def occurring_names(db: Database, text: str, diffeo: bool) -> frozenset[str]:
 def names_in(expression: str) -> frozenset[str]:
     """The same of an expression."""
     found: set[str] = set()
-    _collect(references_in(parse_expression(expression).expr), found)
+    _collect(references_in(parse_expression(expression).expr).every, found)
     return frozenset(found)
 
 

@@ -119,7 +119,7 @@ def _takes(db: Database, other: str, file: str, name: str) -> bool:
 def _members(db: Database, file: str) -> frozenset[tuple[str, str]]:
     """The members of modules that a file uses."""
     diffeo = is_diffeo(file)
-    found = (reference for chunk in chunks(db, file) for reference in chunk_references(db, chunk.text, diffeo))
+    found = (reference for chunk in chunks(db, file) for reference in chunk_references(db, chunk.text, diffeo).every)
     return frozenset((path, name) for path, name in found if path is not None)
 
 

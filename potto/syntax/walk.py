@@ -57,15 +57,6 @@ def walk(node: Node) -> Iterator[Node]:
         pending.extend(reversed(children(current)))
 
 
-def under(node: Node) -> list[Node]:
-    """A node and all under it, the nearer ones first: in half the time of `walk`."""
-    found = [node]
-    for current in found:
-        for name in _INNER[type(current)]:
-            _gather(getattr(current, name), found)
-    return found
-
-
 def deeper_than(node: Node, limit: int) -> Node | None:
     """The first node that lies deeper than `limit` levels, or None. Operands and arguments count for nothing."""
     pending = [(node, 1)]

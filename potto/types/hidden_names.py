@@ -1,25 +1,20 @@
 """Names of parameters, which most callers do not need: who calls a function with all its arguments by place is told
 the same whatever they are called, but for the words of messages.
 
-Owns `without_names`, an interface with signs for names; `only_called`, of what a definition needs no more; and
-`with_names`, which writes the names into messages. So a name that is being typed is no reason to infer callers again.
+Owns `without_names`, an interface with signs for names, and `with_names`, which writes the names into messages. So a
+name that is being typed is no reason to infer callers again.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from typing import Any
 
 from msgspec.structs import replace as changed
 
 from potto.diagnostics import Diagnostic, Replacement
-from potto.modules.free import Reference
 from potto.modules.lookup import DefinitionTarget
 from potto.quick import replace
-from potto.syntax import nodes
-from potto.syntax.nodes import Node
-from potto.syntax.walk import under
 from potto.types.interfaces import Interface
 from potto.types.types import REAL, Function, Parameter, TupleOf, resolve
 from potto.types.unify import NUMBERS, rebuild
@@ -46,23 +41,6 @@ def without_names(found: Interface, target: DefinitionTarget) -> Interface:
     signs = (f"\ue000{place}\ue001{target.file}\ue001{target.name}\ue002" for place in range(len(type.parameters)))
     parameters = tuple([Parameter(sign, p.type) for sign, p in zip(signs, type.parameters)])
     return replace(found, type=Function(parameters, type.result), plain=(), varies=())
-
-
-def only_called(root: Node) -> frozenset[Reference]:
-    """What a definition does nothing with but call it, all arguments by their places."""
-    called: set[int] = set()
-    used: dict[int, Reference] = {}
-    each: Any  # `kind` tells what it is, faster than a type checker can follow
-    for each in under(root):
-        kind = type(each)
-        if kind is nodes.Name:
-            used[id(each)] = None, each.id
-        elif kind is nodes.Member:
-            used[id(each)] = each.path, each.name
-        elif kind is nodes.Apply and all(argument.name is None for argument in each.arguments):
-            called.add(id(each.function))
-    others = {reference for place, reference in used.items() if place not in called}
-    return frozenset(used.values()) - others
 
 
 def with_names(

@@ -8,13 +8,13 @@ is analysed once more.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 
 from potto.diagnostics import Diagnostic
-from potto.modules.free import free_references
+from potto.modules.free import Reference, references_in
 from potto.modules.graph import refer, references, strongly_connected
 from potto.modules.lookup import DefinitionTarget, ModuleTarget, resolve_member
-from potto.modules.texts import chunk_text, definition, is_diffeo, parsed
+from potto.modules.texts import chunk_references, chunk_text, definition, is_diffeo, parsed
 from potto.query import Database, query
 from potto.quick import quick, value
 from potto.syntax import nodes
@@ -24,7 +24,7 @@ from potto.types.analysis import DefinitionAnalysis, Typed, analyse, local_type,
 from potto.types.context import Inference, NamedPart, ensure_stack
 from potto.types.flow import Walk
 from potto.types.flow_binders import walk_statement
-from potto.types.hidden_names import only_called, with_names, without_names
+from potto.types.hidden_names import with_names, without_names
 from potto.types.integrals import statement as infer_statement
 from potto.types.interfaces import Interface, unknown_interface
 from potto.types.lints import lints
@@ -131,10 +131,10 @@ def _analysed(
         item = definition(db, target.file, target.name)
         if item is not None:
             items[target] = item
-    outsides = {
-        target: _outside(db, target.file, references(db, target.file, target.name), items, None if details else item)
-        for target, item in items.items()
-    }
+    outsides = {}
+    for target in items:
+        used, only_called = references(db, *target), () if details else _only_called(db, target)
+        outsides[target] = _outside(db, target.file, used, items, only_called)
     broken = frozenset(target for target in items if _broken(db, target.file, target.name))
     return analyse(items, outsides, broken, details)
 
@@ -146,44 +146,37 @@ def _broken(db: Database, file: str, name: str) -> bool:
     return any(diagnostic.severity == "error" for diagnostic in found)
 
 
+def _only_called(db: Database, target: DefinitionTarget) -> Container[Reference]:
+    """What a definition does nothing with but call it, all arguments by their places."""
+    text = chunk_text(db, target.file, target.name)
+    return () if text is None else chunk_references(db, text, is_diffeo(target.file)).only_called
+
+
 def _outside(
-    db: Database, file: str, used: Sequence[tuple[str | None, str]], group: Sequence[DefinitionTarget] | object = (),
-    caller: nodes.Definition | nodes.DiffeoDefinition | None = None,
+    db: Database, file: str, used: Sequence[Reference], group: Container[DefinitionTarget] = (),
+    only_called: Container[Reference] = (),
 ) -> Outside:  # fmt: skip
-    """What a file provides under the names that are used. What a caller does nothing with but call it has no names of
-    parameters for it."""
-    known: dict[tuple[str | None, str], Meaning] = {}
-    nameless: frozenset[tuple[str | None, str]] | None = frozenset() if caller is None else None
+    """What a file provides under the names that are used. What is only called needs no names of parameters."""
+    known: dict[Reference, Meaning] = {}
     for path, name in used:
         target = refer(db, file, path, name)
         if path is not None and target is not None and resolve_member(db, file, path, name) is None:
             name, path = path.partition(".")[0], None  # a field of a definition
         if isinstance(target, ModuleTarget):
             known[path, name] = ModuleName(name)
-        elif target is not None and isinstance(group, dict) and target in group:
+        elif target is not None and target in group:
             known[path, name] = RecursiveName(target)
         elif target is not None:
-            if nameless is None:
-                assert caller is not None
-                nameless = only_called(caller)
-            of = called if (path, name) in nameless else interface
+            of = called if (path, name) in only_called else interface
             known[path, name] = InterfaceName(target, of(db, target.file, target.name))
     return Outside(db, file, lambda target: plain_reasons(db, target.file, target.name), known)
-
-
-def _used(node: nodes.Expr | nodes.Statement) -> tuple[tuple[str | None, str], ...]:
-    found = (
-        (reference.path, reference.name) if isinstance(reference, nodes.Member) else (None, reference.id)
-        for reference in free_references(node)
-    )
-    return tuple(dict.fromkeys(found))
 
 
 @query(keep=1024)
 def check_statement(db: Database, file: str, statement: nodes.Statement) -> tuple[Diagnostic, ...]:
     """What is wrong with a statement of a script. Spans are the statement's."""
     ensure_stack()
-    inference = Inference(_outside(db, file, _used(statement)), {})
+    inference = Inference(_outside(db, file, references_in(statement).every), {})
     infer_statement(inference, statement)
     inference.finish()
     walk = Walk(inference, {})
@@ -196,7 +189,7 @@ def check_statement(db: Database, file: str, statement: nodes.Statement) -> tupl
 def statement_parts(db: Database, file: str, statement: nodes.Statement) -> tuple[NamedPart, ...]:
     """The names of parts in a statement of a script, or in an expression by itself."""
     ensure_stack()
-    inference = Inference(_outside(db, file, _used(statement)), {})
+    inference = Inference(_outside(db, file, references_in(statement).every), {})
     infer_statement(inference, statement)
     inference.finish()
     return parts(inference)
@@ -213,7 +206,7 @@ def is_derivative(db: Database, file: str, expr: nodes.Expr) -> bool:
     """Whether an expression in a file's scope is the derivative of a function, so that it moves with its arguments
     alone."""
     ensure_stack()
-    inference = Inference(_outside(db, file, _used(expr)), {})
+    inference = Inference(_outside(db, file, references_in(expr).every), {})
     inference.infer(expr)
     return motionless.is_derivative(inference, expr)
 
@@ -229,7 +222,7 @@ def _inferred(
     db: Database, file: str, expr: nodes.Expr, locals: tuple[tuple[str, Type], ...]
 ) -> tuple[Inferred, tuple[Typed, ...]]:
     ensure_stack()
-    inference = Inference(_outside(db, file, _used(expr)), {})
+    inference = Inference(_outside(db, file, references_in(expr).every), {})
     given: dict[Local, Value] = {}
     for name, type in locals:
         opened = open_type(type, inference.level)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from potto.modules import free_members, free_names, free_references
+from potto.modules.free import references_in
 from potto.source import Span
 from potto.syntax import nodes, parse_chunk, parse_expression
 
@@ -75,6 +76,23 @@ def test_references_come_in_the_order_of_the_text() -> None:
     text = "f(b) + (p ? a : if q then (\\x . x + c)(d) else e)"
     found = [text[r.span.start : r.span.end] for r in free_references(parse_expression(text).expr)]
     assert found == ["f", "b", "p", "a", "q", "c", "d", "e"]
+
+
+CALLS = [
+    ("f(x) + f(2*x)", "f"),
+    ("f(x) + m.g(x)", "f m.g"),
+    ("f(x, k=2)", ""),  # by the parameter's name
+    ("f(x) + h(f)", "h"),  # passed on
+    ("(f)(x)", ""),
+    ("(\\f . f(x))(c) + f(x)", "f"),  # the inner one is another
+    ("f(f(x))", "f"),
+]
+
+
+@pytest.mark.parametrize(("text", "called"), CALLS)
+def test_what_is_only_called_by_place(text: str, called: str) -> None:
+    found = references_in(parse_expression(text).expr).only_called
+    assert {name if path is None else f"{path}.{name}" for path, name in found} == set(called.split())
 
 
 def test_deep_trees() -> None:
