@@ -55,7 +55,9 @@ def load(path: str) -> ReadFile:
         return ReadFile(Unreadable("too large", f"{status.st_size:,} bytes"), stamp)
     try:
         with open(path, "rb") as file:
-            data = file.read(MAX_BYTES + 1)
+            data = file.read(status.st_size + 1)  # not the most that is allowed: so much memory would be asked for
+            if len(data) > status.st_size:  # it has grown since
+                data += file.read(MAX_BYTES)
     except OSError as error:
         return ReadFile(Unreadable("no access", _reason(error)), stamp)
     return ReadFile(decode(data), stamp)

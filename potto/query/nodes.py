@@ -188,11 +188,13 @@ class Memo:
     def put(self, value: Any, revision: int, changes: set[Node]) -> None:
         """Set the value. If it is equal, nothing has changed and the old object stays. Whatever others may have read
         before is added to `changes`."""
+        if self.changed_at < 0:  # its first one
+            self.value, self.changed_at = value, revision
+            return
         if self.value is not GONE and same(self.value, value):
             return
         old, entries = self.value, self.entries
-        if self.changed_at >= 0:
-            changes.add(self)
+        changes.add(self)
         renew(self, value, revision)
         if entries is None:
             return

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from potto.syntax.tokens import FIRST_NAME, Token
+from potto.syntax.tokens import FIRST_NAME, KEYWORDS, Token
 
 ENDS_OPERAND = frozenset({"NAME", "NUMBER", "MEMBER", "FIELD", "RPAR", "RSQB"})
 BEHIND = ENDS_OPERAND - {"NUMBER"}
@@ -20,6 +20,8 @@ _CONTEXTUAL = {
     "max": ("SUM", _THROUGH),
 }
 """The kind of each, and what has to follow."""
+MAY_BE_WORDS = frozenset({*KEYWORDS, *_CONTEXTUAL, "d", "return"})
+"""All that is not always a name."""
 
 
 def contextual(tokens: list[Token], word: str, text: str, end: int) -> str | None:

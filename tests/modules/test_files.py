@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import os
 import threading
+import tracemalloc
 from pathlib import Path
 
 import pytest
 
 from potto.modules import Files, Unreadable, find_module, load_file, module_diagnostics, names, resolve, source
-from potto.modules.files import MAX_BYTES
+from potto.modules.files import MAX_BYTES, load
 from potto.modules.texts import content
 from potto.query import Database
 
@@ -55,6 +56,25 @@ def test_what_is_no_text_is_told_with_the_place(
     assert source(files.db, str(path)) is None
     (tmp_path / "main.po").write_text("from m import f\nprint(f(1))\n")
     assert codes(files, tmp_path / "main.po") == [code], "said of the import too, and nothing about its names"
+
+
+def test_a_small_file_takes_little_memory(tmp_path: Path) -> None:
+    (tmp_path / "m.po").write_text("def f(x) x\n")
+    tracemalloc.start()
+    try:
+        assert load(str(tmp_path / "m.po")).content == "def f(x) x\n"
+        assert tracemalloc.get_traced_memory()[1] < 100_000  # bytes; a page or two of it for the buffer
+    finally:
+        tracemalloc.stop()
+
+
+def test_a_file_that_grows_while_it_is_read_is_read_to_its_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "m.po"
+    path.write_text("def f(x) x\n")
+    before = os.stat(path)
+    path.write_text("def f(x) x\ndef g(x) f(x)\n")
+    monkeypatch.setattr("potto.modules.files.os.stat", lambda _: before)
+    assert load(str(path)).content == "def f(x) x\ndef g(x) f(x)\n"
 
 
 def test_what_is_no_file(files: Files, tmp_path: Path) -> None:
