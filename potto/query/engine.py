@@ -287,10 +287,8 @@ class Engine:
             raise Cancelled
         index, caller, mark = len(self._running), self._frame, len(self._provisional)
         frame: dict[Node, None] = {}
-        fresh, changed_at = memo.value is GONE and memo.verified_at < 0, memo.changed_at
-        before = None if fresh else memo.kept()
-        if memo.ring:
-            memo.break_ring()
+        fresh, before, changed_at = memo.value is GONE and memo.verified_at < 0, memo.kept(), memo.changed_at
+        memo.break_ring()
         memo.index, memo.low, memo.cyclic = index, index, False
         self._running.append(memo)
         self._frame = frame
@@ -301,8 +299,7 @@ class Engine:
             if not fresh and memo.changed_at == changed_at:
                 memo.cuts = True
             self._depend(memo, frame)
-            if before is not None:
-                memo.before = before
+            memo.before = before or memo.before
         except BaseException as error:
             self._fail(memo, frame, mark, fresh, isinstance(error, Exception))
             raise

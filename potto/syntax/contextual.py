@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from potto.syntax.tokens import FIRST_NAME, KEYWORDS, Token
+from potto.syntax.tokens import FIRST_NAME, KEYWORDS, OPERATORS, Token
 
 ENDS_OPERAND = frozenset({"NAME", "NUMBER", "MEMBER", "FIELD", "RPAR", "RSQB"})
 BEHIND = ENDS_OPERAND - {"NUMBER"}
@@ -22,6 +22,9 @@ _CONTEXTUAL = {
 """The kind of each, and what has to follow."""
 MAY_BE_WORDS = frozenset({*KEYWORDS, *_CONTEXTUAL, "d", "return"})
 """All that is not always a name."""
+_SEEN_TO = ("LPAR", "LSQB", "RPAR", "RSQB", "COMMA", "DOT", "INTEGRAL")
+SIMPLE_OPERATORS = {word: kind for word, kind in OPERATORS.items() if kind not in _SEEN_TO}
+"""Those that mean the same wherever they stand."""
 
 
 def contextual(tokens: list[Token], word: str, text: str, end: int) -> str | None:

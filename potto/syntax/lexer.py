@@ -14,7 +14,7 @@ from potto.diagnostics import Diagnostic
 from potto.quick import quick, value
 from potto.source import Span
 from potto.syntax import kinds
-from potto.syntax.contextual import BEHIND, ENDS_OPERAND, MAY_BE_WORDS, contextual, uses_parameters
+from potto.syntax.contextual import BEHIND, ENDS_OPERAND, MAY_BE_WORDS, SIMPLE_OPERATORS, contextual, uses_parameters
 from potto.syntax.head import BlockTracker
 from potto.syntax.nesting import Nesting
 from potto.syntax.sums import mark_bodies
@@ -32,9 +32,6 @@ from potto.syntax.unknown import (
 
 MAX_LENGTH = 250_000
 _new = tuple.__new__  # a token without the detour over NamedTuple's own `__new__`, which costs as much again
-_NOT_SIMPLE = frozenset({"LPAR", "LSQB", "RPAR", "RSQB", "COMMA", "DOT", "INTEGRAL"})
-_SIMPLE = {word: kind for word, kind in OPERATORS.items() if kind not in _NOT_SIMPLE}
-"""Operators that mean the same wherever they stand."""
 _BINDING = re.compile(rf"(?:{FIRST_NAME.pattern}|\([^()\n]*\))[ \t]*=(?!=)")
 _D = re.compile(r"[ \t]*\(")
 _BOUNDS = re.compile(r"[ \t\n]*[\[(]")
@@ -94,17 +91,12 @@ class _Lexer:
             kind = found.lastgroup
             start, position = found.span(found.lastindex or 0)
             word = text[start:position]
-            if kind == "NAME":
-                if word in MAY_BE_WORDS or "." in word or self.clauses:
-                    position = self._name(word, start, position)
-                else:
-                    self._add("NAME", word, start, position)
-            elif kind == "OPERATOR":
-                simple = _SIMPLE.get(word)
-                if simple is None:
-                    position = self._operator(word, start, position)
-                else:
-                    self._add(simple, word, start, position)
+            if kind == "NAME" and (word in MAY_BE_WORDS or "." in word or self.clauses):
+                position = self._name(word, start, position)
+            elif kind == "OPERATOR" and word not in SIMPLE_OPERATORS:
+                position = self._operator(word, start, position)
+            elif kind == "NAME" or kind == "OPERATOR":
+                self._add(SIMPLE_OPERATORS.get(word, "NAME"), word, start, position)
             elif kind == "NUMBER":
                 tokens.append(_new(Token, ("NUMBER", word, start, position)))
                 if not brackets and blocks.state != "body":
