@@ -23,7 +23,7 @@ from potto.calculus.surfaces.case_split import by_extremes
 from potto.calculus.surfaces.finding import Finding, Resolve
 from potto.core.packing import packed
 from potto.core.terms import Integral, Lam, Term, function_of, tuple_
-from potto.integrate.decomposition.vanishing import held, vanishing_of
+from potto.integrate.decomposition.vanishing import Vanishing, held, vanishing_of
 from potto.integrate.levels import Group, LevelPlan, group_levels
 
 NO_KINKS = function_of(tuple_(()))
@@ -45,7 +45,7 @@ class Outline(Struct, frozen=True, dict=True):
     levels: tuple[LevelPlan, ...]
     groups: tuple[Group, ...]
     body: Lam
-    vanishing: Any
+    vanishing: Vanishing
     hides: bool = False
     surfaces: tuple[Term, ...] = ()
     doublings: int = 0

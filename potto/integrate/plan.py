@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from msgspec import Struct
@@ -47,6 +47,7 @@ from potto.core.terms import (
     var,
     with_integrand,
 )  # fmt: skip
+from potto.integrate.decomposition.vanishing import Vanishing
 from potto.integrate.fixed.straight import StraightIntegral, straight
 from potto.integrate.levels import Group, LevelPlan
 from potto.integrate.outline import Outline, Outlines, outlined
@@ -104,7 +105,7 @@ class Plan(Struct, frozen=True, dict=True):
         return self.outline.body
 
     @property
-    def vanishing(self) -> Any:
+    def vanishing(self) -> Vanishing:
         return self.outline.vanishing
 
     @property

@@ -224,3 +224,158 @@ def test_twice_the_conditions_cost_twice_as_much(integrand: str, batch: int) -> 
     for small, large in itertools.pairwise(costs):
         assert large[0] <= STEP * small[0]
         assert large[1] <= STEP * small[1]
+
+
+# What a condition compares, with the place up to which it holds on [0, 1], and the speed of that by the parameter.
+CURVED = {
+    "x^2 < {}": (lambda a: mpmath.sqrt(a), lambda a: 1 / (2 * mpmath.sqrt(a))),
+    "exp(x) < 1 + {}": (lambda a: mpmath.log(1 + a), lambda a: 1 / (1 + a)),
+    "k*x < {}": (lambda a: a / Number(0.8), lambda a: 1 / Number(0.8)),
+    "k*x^2 + x - {} < 0": (
+        lambda a: (mpmath.sqrt(1 + 4 * Number(0.8) * a) - 1) / (2 * Number(0.8)),
+        lambda a: 1 / mpmath.sqrt(1 + 4 * Number(0.8) * a),
+    ),
+    "sqrt(x + 1) < 1 + {}/2": (lambda a: (1 + a / 2) ** 2 - 1, lambda a: 1 + a / 2),
+    "1/(1 + x) > 1 - {}/3": (lambda a: 1 / (1 - a / 3) - 1, lambda a: 1 / (1 - a / 3) ** 2 / 3),
+}
+
+
+@pytest.mark.parametrize("condition", CURVED)
+@pytest.mark.parametrize("n", [5, 13, 60])
+def test_conditions_that_are_curved_or_have_parameters_for_slopes(condition: str, n: int) -> None:
+    names, at = parameters(n), RNG.uniform(0.01, 1.2, n).tolist()
+    terms = " + ".join(f"[{condition.format(name)}]" for name in names)
+    f = potto.compile(f"def f(k, {', '.join(names)}) integral [0, 1] exp(x)/(1 + {terms}) d(x)").f
+    place, speed = CURVED[condition]
+    with mpmath.workdps(DIGITS):
+        cuts = [place(Number(a)) for a in at]
+        value, slopes = truth(lambda x, sides: mpmath.exp(x) / (1 + sum(sides)), cuts)
+        slopes = [slope * speed(Number(a)) for slope, a in zip(slopes, at, strict=True)]
+    checked(potto.grad(f, names)(0.8, *at), value, slopes)
+    batch = potto.grad(f, names[0])(0.8, np.array(at[:1] * 3), *at[1:])
+    assert batch.value[2] == pytest.approx(float(value), rel=1e-13, abs=0)
+    assert batch.tangent[2] == pytest.approx(float(slopes[0]), rel=1e-12, abs=0)
+
+
+def test_roots_that_come_in_pairs_or_are_not_there() -> None:
+    """`x^2 < a` between two cuts, one of which may be below the range; nowhere for a < 0."""
+    n, low = 20, -0.6
+    names, at = parameters(n), RNG.uniform(-0.5, 1.2, n).tolist()
+    terms = " + ".join(f"{k}*[x^2 < {name}]" for k, name in enumerate(names))
+    f = potto.compile(f"def f({', '.join(names)}) integral [{low}, 1] exp(x)*({terms}) d(x)").f
+    with mpmath.workdps(DIGITS):
+        value, slopes = Number(0), []
+        for k, a in enumerate(at):
+            root = mpmath.sqrt(max(a, 0))
+            lower, upper = max(-root, Number(low)), min(root, 1)
+            value += k * (mpmath.exp(upper) - mpmath.exp(lower)) if a > 0 else 0
+            edges = [x for x in (-root, root) if low < x < 1 and a > 0]
+            slopes.append(k * mpmath.fsum(mpmath.exp(x) / (2 * root) for x in edges))
+    checked(potto.grad(f, names)(*at), value, slopes)
+
+
+def union(at: Sequence[float], half: float) -> list[tuple[Number, Number, int | None, int | None]]:
+    """The stretches of [0, 1] that lie within `half` of one of these, with whose ends they are; None: of the range."""
+    found: list[list[tuple[Number, int]]] = []
+    for x, k in sorted((x, k) for k, x in enumerate(at)):
+        if found and x - half < found[-1][1][0]:
+            found[-1][1] = (Number(x) + half, k)
+        else:
+            found.append([(Number(x) - half, k), (Number(x) + half, k)])
+    return [
+        (max(a, Number(0)), min(b, Number(1)), i if a > 0 else None, j if b < 1 else None)
+        for (a, i), (b, j) in found
+        if b > 0 and a < 1
+    ]
+
+
+@pytest.mark.parametrize("n", [5, 13, 40])
+@pytest.mark.parametrize("written", ["[{}]", "[max({}) > 0]", "(1 - [not ({})])"])
+def test_a_union_of_many(n: int, written: str) -> None:
+    half, names, at = 0.3 / n, parameters(n), RNG.uniform(-0.1, 1.1, n).tolist()
+    one = f"{half!r} - abs(x - {{}})" if "max" in written else f"abs(x - {{}}) < {half!r}"
+    inside = written.format((", " if "max" in written else " or ").join(one.format(name) for name in names))
+    f = potto.compile(f"def f({', '.join(names)}) integral [0, 1] exp(x)*{inside} d(x)").f
+    with mpmath.workdps(DIGITS):
+        value, slopes = Number(0), [Number(0)] * n
+        for a, b, i, j in union(at, half):
+            value += mpmath.exp(b) - mpmath.exp(a)
+            for end, whose, sign in ((a, i, -1), (b, j, 1)):
+                if whose is not None:
+                    slopes[whose] += sign * mpmath.exp(end)
+    checked(potto.grad(f, names)(*at), value, slopes, 1e-12)  # ends of a stretch all but cancel
+
+
+@pytest.mark.parametrize("n", [5, 13, 30])
+def test_the_first_condition_that_holds(n: int) -> None:
+    """n values that are parameters, and what all conditions have to hold for."""
+    names, values = parameters(n), [f"c{k}" for k in range(n)]
+    at, c = np.sort(RNG.uniform(0.02, 0.98, n)).tolist(), RNG.uniform(-1, 1, n).tolist()
+    chosen = "0"
+    for name, value in zip(reversed(names), reversed(values), strict=True):
+        chosen = f"(if [x < {name}] then {value} else {chosen})"
+    every = " and ".join(f"x > {name}/2" for name in names)
+    f = potto.compile(f"def f({', '.join((*names, *values))}) integral [0, 1] exp(x)*({chosen} + 3*[{every}]) d(x)").f
+    with mpmath.workdps(DIGITS):
+        ends = [Number(0), *map(Number, at)]
+        pieces = [mpmath.exp(b) - mpmath.exp(a) for a, b in itertools.pairwise(ends)]
+        value = mpmath.fsum(x * y for x, y in zip(pieces, c, strict=True)) + 3 * (mpmath.e - mpmath.exp(ends[-1] / 2))
+        by_cut = [(x - y) * mpmath.exp(a) for a, x, y in zip(at, c, [*c[1:], 0.0], strict=True)]
+        by_cut[-1] -= 3 * mpmath.exp(ends[-1] / 2) / 2
+    checked(potto.grad(f, [*names, *values])(*at, *c), value, [*by_cut, *pieces], 1e-12)
+
+
+def test_a_condition_without_a_value_is_told() -> None:
+    """log(x) has no value below 0, which is nobody's cut but its own."""
+    names = parameters(8)
+    terms = " + ".join(f"[log(x) < {name}]" for name in names)
+    f = potto.compile(f"def f({', '.join(names)}) integral [-0.1, 1] 1/(1 + {terms}) d(x)").f
+    found = f(*np.linspace(-3.0, -0.1, 8).tolist())
+    assert np.isnan(found.value)
+
+
+FORMS = {
+    "curved": "[x^2 < {k}*t/{m}]",
+    "slopes": "[t*x < {k}/{m}]",
+    "asked": "[exp(x) < 1 + {k}*t/{m}]",
+    "calls": "inside(x, {k}*t/{m})",
+}
+
+
+@pytest.mark.parametrize("batch", [1, 20])
+@pytest.mark.parametrize("form", [*FORMS, "union", "greatest"])
+def test_twice_as_many_of_any_form(form: str, batch: int) -> None:
+    """Evaluations, and functions that are called, at parameters that are new at each call."""
+    costs = []
+    for n in (10, 20, 40, 80):
+        ks = range(1, n + 1)
+        if form == "union":
+            integrand = f"exp(x)*[{' or '.join(f'abs(x - {k}*t/{n + 1}) < 0.3/{n}' for k in ks)}]"
+        elif form == "greatest":
+            integrand = f"exp(x)*[max({', '.join(f'0.3/{n} - abs(x - {k}*t/{n + 1})' for k in ks)}) > 0]"
+        else:
+            integrand = f"exp(x)/(1 + {' + '.join(FORMS[form].format(k=k, m=n + 1) for k in ks)})"
+        program = f"def inside(x, a) [x^2 < a]\ndef f(t) integral [0, 1] {integrand} d(x)"
+        f = potto.deriv(potto.compile(program).f)
+        new = iter(np.outer((0.9, 0.85, 0.95, 0.92), np.linspace(0.97, 1.0, batch)))
+
+        def call(f: potto.Function = f, new: object = new) -> potto.Estimate:
+            t = next(new)  # type: ignore[call-overload]
+            return f((float(t[0]), 1.0) if batch == 1 else (t, np.ones(batch)))
+
+        with potto.settings(backend="numpy"):  # when machine code is made depends on the time that numpy took
+            call()
+            call()
+            costs.append((np.sum(call().evals), calls_in(call)))
+    for small, large in itertools.pairwise(costs):
+        assert all(b <= STEP * a for a, b in zip(small, large, strict=True)), costs
+
+
+def test_a_union_is_planned_in_as_many_steps_as_it_has_regions() -> None:
+    """Functions that its first call calls: 2^n ways lead through its conditions."""
+    costs = []
+    for n in (10, 20, 40, 80):
+        inside = " or ".join(f"abs(x - {k}*t/{n + 1}) < 0.3/{n}" for k in range(1, n + 1))
+        f = potto.compile(f"def f(t) integral [0, 1] exp(x)*[{inside}] d(x)").f
+        costs.append(calls_in(lambda f=f: f(0.9)))  # type: ignore[misc]
+    assert all(large <= STEP * small for small, large in itertools.pairwise(costs)), costs

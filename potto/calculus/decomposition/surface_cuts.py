@@ -146,7 +146,7 @@ def cut_of(placed: Placed, variable: str) -> Cut:
     roots: dict[Term, None] = {}
     families: dict[Family, None] = {}
     for part in here:
-        found = _roots(part, variable)
+        found = all_sections(part, variable)
         if found is None:
             return Cut(surface, key, jumps, turning, None, (), steps, product, holds=placed.holds, bends=placed.bends)
         roots.update(dict.fromkeys((*found.roots, *found.poles)))
@@ -155,7 +155,7 @@ def cut_of(placed: Placed, variable: str) -> Cut:
     return Cut(surface, key, jumps, turning, *sections, steps, product, holds=placed.holds, bends=placed.bends)
 
 
-def _roots(part: WrittenSurface, variable: str) -> Sections | None:
+def all_sections(part: WrittenSurface, variable: str) -> Sections | None:
     """All the roots of a factor: of the form as written, which keeps digits, else of the canonical one."""
     for surface in (part.form, part.key):
         found = sections_in(surface, variable)

@@ -8,7 +8,7 @@ only as deep as its values go.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import lru_cache
 
 from msgspec import Struct
@@ -24,6 +24,7 @@ from potto.calculus.surfaces.nested_brackets import BINDERS, pieces
 from potto.calculus.surfaces.trace import CallSite, Side, Subkernel, layout, spine
 from potto.core.terms import (
     App,
+    Branch,
     Const,
     Deriv,
     If,
@@ -35,8 +36,8 @@ from potto.core.terms import (
     Term,
     Tuple,
     Var,
+    children,
     const,
-    outside,
     postorder,
     proj,
     substitute,
@@ -227,7 +228,7 @@ def centers(node: Prim) -> tuple[Term, ...]:
     if node.op == "div" and isinstance(where, Prim) and where.op in ("pow", "mul"):
         return ()  # a pole there, not a center
     found: dict[Term, None] = {}
-    for part in outside(where, BINDERS):
+    for part in postorder(where, below=_values):
         if not isinstance(part, Prim) or not part.free:
             continue
         if part.op == "pow" and isinstance(part.args[1], Const) and part.args[1].value % 2 == 0:
@@ -237,6 +238,13 @@ def centers(node: Prim) -> tuple[Term, ...]:
         elif node.op == "div" and part.op in ("exp", "cosh"):
             found[part.args[0]] = None
     return tuple(found)
+
+
+def _values(node: Term) -> Sequence[Term]:
+    """What a value is made of: not what a condition compares, at which it is cut anyway."""
+    if isinstance(node, BINDERS):
+        return ()
+    return (node.then, node.orelse) if isinstance(node, Branch | If) else children(node)
 
 
 def _spine(head: Term) -> tuple[Term, tuple[tuple[Term, ...], ...]]:

@@ -1,14 +1,16 @@
 """Where an integrand is exactly zero, told from the sides of its surfaces alone.
 
-Owns `vanishing_of`, which makes the test, `vanishes`, which asks it, and `held`, the sides that it asks for.
+Owns `Vanishing`, the test, `vanishing_of`, which makes it, `vanishes`, which asks it, and `held`, the sides that it
+asks for.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from msgspec import Struct
 
 from potto.calculus.inlining.currying import arguments_of, sizes_of, uncurry
 from potto.calculus.surfaces.finding import Resolve
@@ -18,52 +20,122 @@ from potto.kernels.cells import Mask
 from potto.primitives import EXACT
 
 Numbers = Mapping[tuple[int, ...], tuple[Any, int]]  # groups, and orientations, by the paths of their branches
+NEVER, ALWAYS = 0, 1  # numbers of tests that need no sides
 
 
-def vanishing_of(body: Term, numbers: Numbers, part: Term | None = None, resolve: Resolve = lambda head: None) -> Any:
-    """A test on sides: True, False, or ("and" | "or", tests), or (group, orientation, then, orelse).
+class Side(Struct, frozen=True):
+    """A test by the side of a group: the one above it, and the one below, by their numbers."""
+
+    group: Any
+    orientation: int
+    then: int
+    orelse: int
+
+
+class Joined(Struct, frozen=True):
+    """Whether all of some tests hold, or any of them does."""
+
+    every: bool
+    parts: tuple[int, ...]
+
+
+class Vanishing(Struct, frozen=True):
+    """A test on sides. rows: what it is made of, each once, from the parts to the whole, with numbers in this order
+    behind NEVER and ALWAYS. whole: its own number. In a union of n regions 2^n ways lead through n rows."""
+
+    rows: tuple[Side | Joined, ...] = ()
+    whole: int = NEVER
+
+
+class _Rows:
+    """Rows, as they are made."""
+
+    def __init__(self) -> None:
+        self.numbers: dict[Side | Joined, int] = {}
+
+    def number(self, row: Side | Joined) -> int:
+        return self.numbers.setdefault(row, 1 + ALWAYS + len(self.numbers))
+
+    def joined(self, every: bool, parts: Sequence[int]) -> int:
+        decisive, other = (NEVER, ALWAYS) if every else (ALWAYS, NEVER)
+        if decisive in parts:
+            return decisive
+        rest = tuple(part for part in parts if part != other)
+        if not rest:
+            return other
+        return rest[0] if len(rest) == 1 else self.number(Joined(every, rest))
+
+    def test(self, whole: int) -> Vanishing:
+        """The test of this number, with the rows that it is made of."""
+        rows = list(self.numbers)
+        asked = {whole}
+        for number in range(len(rows) + ALWAYS, ALWAYS, -1):
+            if number in asked:
+                asked.update(_parts(rows[number - 1 - ALWAYS]))
+        kept = sorted(asked - {NEVER, ALWAYS})
+        place = {NEVER: NEVER, ALWAYS: ALWAYS} | {number: n for n, number in enumerate(kept, 1 + ALWAYS)}
+        return Vanishing(tuple(_renumbered(rows[number - 1 - ALWAYS], place) for number in kept), place[whole])
+
+
+def _parts(row: Side | Joined) -> tuple[int, ...]:
+    return row.parts if isinstance(row, Joined) else (row.then, row.orelse)
+
+
+def _renumbered(row: Side | Joined, place: Mapping[int, int]) -> Side | Joined:
+    if isinstance(row, Joined):
+        return Joined(row.every, tuple(place[part] for part in row.parts))
+    return Side(row.group, row.orientation, place[row.then], place[row.orelse])
+
+
+def vanishing_of(
+    body: Term, numbers: Numbers, part: Term | None = None, resolve: Resolve = lambda head: None
+) -> Vanishing:
+    """The test of whether an integrand is 0.
 
     part: what is tested, a part of the body that the paths of `numbers` are those of; all of it if None. resolve: gives
     the functions that are looked into where they are called.
     """
-    return _tests(body, numbers, {}, resolve)[body if part is None else part]
+    rows = _Rows()
+    return rows.test(_tests(rows, body, numbers, {}, resolve)[body if part is None else part])
 
 
-def _tests(body: Term, numbers: Numbers, given: Mapping[Term, Any], resolve: Resolve) -> dict[Term, Any]:
+def _tests(rows: _Rows, body: Term, numbers: Numbers, given: Mapping[Term, int], resolve: Resolve) -> dict[Term, int]:
     """The tests of all parts of a body. given: those of its parameters."""
     index = layout(body).index
     memo = dict(given)
     for node in postorder(body):
         if node not in given:
             site = index.get((node, 0)) if isinstance(node, App) else None
-            memo[node] = (_zero(node, memo, index, numbers) if site is None or not isinstance(node, App)
-                          else _called(node, memo, site, numbers, resolve))  # fmt: skip
+            memo[node] = (_zero(rows, node, memo, index, numbers) if site is None or not isinstance(node, App)
+                          else _called(rows, node, memo, site, numbers, resolve))  # fmt: skip
     return memo
 
 
-def _called(call: App, memo: dict[Term, Any], site: int, numbers: Numbers, resolve: Resolve) -> Any:
+def _called(rows: _Rows, call: App, memo: dict[Term, int], site: int, numbers: Numbers, resolve: Resolve) -> int:
     """The test of what a function gives, in which some of its branches are told from sides."""
     inner = {path[1:]: place for path, place in numbers.items() if path[:1] == (site,) and path[1:]}
     head, groups = spine(call)
     function = resolve(head) if inner else None
     if not isinstance(function, Lam):
-        return False
+        return NEVER
     params, body = uncurry(function, sizes_of(groups))
     args = arguments_of(function, groups)
     if len(args) != len(params):
-        return False
-    given: dict[Term, Any] = {var(name): memo.get(arg, False) for name, arg in zip(params, args, strict=True)}
-    return _tests(body, inner, given, resolve)[body]
+        return NEVER
+    given: dict[Term, int] = {var(name): memo.get(arg, NEVER) for name, arg in zip(params, args, strict=True)}
+    return _tests(rows, body, inner, given, resolve)[body]
 
 
-def _zero(node: Term, memo: dict[Term, Any], index: Mapping[tuple[Term, int], int], numbers: Any) -> Any:
+def _zero(
+    rows: _Rows, node: Term, memo: dict[Term, int], index: Mapping[tuple[Term, int], int], numbers: Numbers
+) -> int:
     match node:
         case Const():
-            return node.value == 0
+            return ALWAYS if node.value == 0 else NEVER
         case Prim(op="mul"):
-            return _join("or", [memo[a] for a in node.args], True)
+            return rows.joined(False, [memo[a] for a in node.args])
         case Prim(op="add"):
-            return _join("and", [memo[a] for a in node.args], False)
+            return rows.joined(True, [memo[a] for a in node.args])
         case Prim(op="div"):
             return memo[node.args[0]]
         case Prim(op=op, args=(inner,)) if EXACT.get((op, 0.0)) == 0:
@@ -71,58 +143,55 @@ def _zero(node: Term, memo: dict[Term, Any], index: Mapping[tuple[Term, int], in
         case Branch():
             place = numbers.get((index.get((node, 2), -1),))
             then, orelse = memo[node.then], memo[node.orelse]
-            if place is None or (then is False and orelse is False):
-                return _join("and", [then, orelse], False)
-            return ("side", *place, then, orelse)
+            if place is None or then == orelse == NEVER:
+                return rows.joined(True, [then, orelse])
+            return rows.number(Side(*place, then, orelse))
         case If():
-            return _join("and", [memo[node.then], memo[node.orelse]], False)
+            return rows.joined(True, [memo[node.then], memo[node.orelse]])
         case Tuple() | ListOf():
-            return _join("and", [memo[a] for a in node.items], False)
+            return rows.joined(True, [memo[a] for a in node.items])
         case Proj():
             return memo[node.term]
         case _:
-            return False
+            return NEVER
 
 
-def _join(how: str, tests: list[Any], decisive: bool) -> Any:
-    """`decisive` is the value of one test that settles the whole."""
-    if any(t is decisive for t in tests):
-        return decisive
-    rest = tuple(t for t in tests if t is not (not decisive))
-    if not rest:
-        return not decisive
-    return rest[0] if len(rest) == 1 else (how, *rest)
-
-
-def vanishes(test: Any, sides: Mapping[int, Mask]) -> Any:
+def vanishes(test: Vanishing, sides: Mapping[int, Mask]) -> Any:
     """Evaluate a vanishing test on sides: False, True or a mask."""
-    if isinstance(test, bool):
-        return test
-    if test[0] == "side":
-        _, group, orientation, then, orelse = test
-        mask = sides.get(group)
-        a, b = vanishes(then, sides), vanishes(orelse, sides)
-        if mask is None:
-            return a & b
-        if orientation < 0:
-            a, b = b, a
-        return (mask & a) | (np.logical_not(mask) & b)
-    result = vanishes(test[1], sides)
-    for inner in test[2:]:
-        result = result | vanishes(inner, sides) if test[0] == "or" else result & vanishes(inner, sides)
-    return result
+    found: list[Any] = [False, True]
+    for row in test.rows:
+        if isinstance(row, Joined):
+            first, *rest = row.parts
+            value = found[first]
+            for part in rest:
+                value = value & found[part] if row.every else value | found[part]
+        else:
+            value = _on_side(sides.get(row.group), row.orientation, found[row.then], found[row.orelse])
+        found.append(value)
+    return found[test.whole]
 
 
-def held(test: Any) -> dict[Any, int]:
+def _on_side(above: Mask | None, orientation: int, then: Any, orelse: Any) -> Any:
+    if above is None:
+        return then & orelse
+    if orientation < 0:
+        then, orelse = orelse, then
+    return (above & then) | (np.logical_not(above) & orelse)
+
+
+def held(test: Vanishing) -> dict[Any, int]:
     """The groups of which one side has to hold, 1 or -1, where an integrand does not vanish."""
-    if isinstance(test, bool):
-        return {}
-    if test[0] == "or":
-        return {group: side for part in test[1:] for group, side in held(part).items()}
-    if test[0] == "and":
-        first, *rest = map(held, test[1:])
-        return {group: side for group, side in first.items() if all(other.get(group) == side for other in rest)}
-    _, group, orientation, then, orelse = test
-    if then is True:
-        return {**held(orelse), group: -orientation}
-    return {**held(then), group: orientation} if orelse is True else {}
+    found: list[dict[Any, int]] = [{}, {}]
+    for row in test.rows:
+        if isinstance(row, Side):
+            if row.then == ALWAYS:
+                own = {**found[row.orelse], row.group: -row.orientation}
+            else:
+                own = {**found[row.then], row.group: row.orientation} if row.orelse == ALWAYS else {}
+        elif row.every:
+            first, *rest = [found[part] for part in row.parts]
+            own = {group: side for group, side in first.items() if all(other.get(group) == side for other in rest)}
+        else:
+            own = {group: side for part in row.parts for group, side in found[part].items()}
+        found.append(own)
+    return found[test.whole]

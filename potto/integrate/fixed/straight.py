@@ -17,24 +17,19 @@ from msgspec import Struct
 from numpy.typing import NDArray
 
 from potto.core.terms import (
-    ONE,
-    ZERO,
     Branch,
     Const,
-    If,
     Integral,
     Lam,
     Term,
     Tuple,
-    branch,
     children,
     function_of,
-    if_,
     postorder,
-    prim,
     rebuild,
     tuple_,
 )
+from potto.integrate.fixed.root_choices import choices_of, chosen, smooth
 from potto.integrate.fixed.steps.step_integral import StepIntegral, step_integral
 from potto.integrate.levels import LevelPlan
 from potto.integrate.rules.complex_enclosures import enclosable, known_to_discs
@@ -118,12 +113,9 @@ def straight(term: Integral, body: Term, levels: Sequence[LevelPlan]) -> Straigh
         return None
     surfaces = tuple(dict.fromkeys(node.surface for node in nodes if isinstance(node, Branch)))
     cuts = [cut for level in levels for cut in children(level.frame.body)]
-    # What the program chooses by may have two derivatives at an edge. The formulas of a root go over into each other.
-    written = {*postorder(term), *nodes}
-    solved = (node for node in postorder(*cuts) if node not in written)
-    choices = tuple({choice: None for node in solved if (choice := _choice(node, term))})
-    either = children(_chosen(tuple_(cuts), dict.fromkeys(choices))) if choices else cuts
-    if len(choices) > MOST_CHOICES or not (all(map(enclosable, (*surfaces, *either))) and _enclosable_sides(body)):
+    choices = choices_of(cuts, {*postorder(term), *nodes}, term.variables)
+    analytic = all(map(enclosable, surfaces)) and smooth(cuts, choices) and _enclosable_sides(body)
+    if len(choices) > MOST_CHOICES or not analytic:
         return None
     places, frames = zip(*(_distinct(level.frame) for level in levels), strict=True)
     free = body.free.union(*(frame.body.free for frame in frames)) - set(term.variables)
@@ -147,35 +139,9 @@ def _jumps(level: LevelPlan, place: Mapping[int, int]) -> tuple[tuple[Term, tupl
     return tuple((cut.surface, tuple(rows.get(number, ()))) for number, cut in enumerate(level.level.cuts) if cut.jumps)
 
 
-def _choice(node: Term, term: Integral) -> Term | None:
-    """1 or 0, as a condition of the parameters alone is met or not, if one decides what this is."""
-    if not isinstance(node, Branch | If):
-        return None
-    found = _met(node)
-    return found if found.free.isdisjoint(term.variables) else None
-
-
-def _met(node: Branch | If) -> Term:
-    if isinstance(node, If):
-        return if_(node.condition, ONE, ZERO)
-    return branch(node.coordinates, node.strict, ONE, ZERO)
-
-
-def _chosen(term: Term, sides: Mapping[Term, bool | None]) -> Term:
-    """A term with these choices met or not, or, for None, everything in it that there may be: only to be looked at."""
-    memo: dict[Term, Term] = {}
-    for node in postorder(term):
-        if isinstance(node, Branch | If) and (choice := _met(node)) in sides:
-            side, then, orelse = sides[choice], memo[node.then], memo[node.orelse]
-            memo[node] = prim("add", then, orelse) if side is None else then if side else orelse
-        else:
-            memo[node] = rebuild(node, tuple(memo[c] for c in children(node)))
-    return memo[term]
-
-
 def _with_choices(plan: StraightIntegral, held: tuple[tuple[Term, bool], ...]) -> StraightIntegral:
     """The plan where choices fall like this; formulas that are the same then are one cut."""
-    places, frames = zip(*(_distinct(function_of(_chosen(tuple_(items), dict(held)))) for items in plan.items),
+    places, frames = zip(*(_distinct(function_of(chosen(tuple_(items), dict(held)))) for items in plan.items),
                          strict=True)  # fmt: skip
     jumps = tuple(
         tuple((surface, tuple({place[row]: None for row in rows})) for surface, rows in level)
@@ -186,7 +152,9 @@ def _with_choices(plan: StraightIntegral, held: tuple[tuple[Term, bool], ...]) -
     shared = tuple(own | more for own, more in zip(plan.shared, both, strict=True))
     free = plan.body.free.union(*(frame.body.free for frame in frames)) - set(plan.variables)
     names = tuple(sorted(free))
-    return StraightIntegral(plan.variables, frames, jumps, turning, shared, plan.body, plan.surfaces, names, held=held)
+    return StraightIntegral(
+        plan.variables, frames, jumps, turning, shared, plan.body, plan.surfaces, names, held=held, steps=plan.steps
+    )
 
 
 def rows_between(between: Ints, variables: int) -> RowNumbers:

@@ -149,8 +149,9 @@ class Direct(Struct, frozen=True):
 
     def _swept(self, machine: Machine, rule: StraightIntegral, env: Mapping[str, Value]) -> SweptCall | None:
         """The call with its derivatives by the arguments that are on a tape, in its order, if each is one parameter."""
-        cells = [(place, cell.t[0]) for place, cell in env.items() if isinstance(cell, Cell) and cell.t]
-        order = [place for place, _ in sorted(cells, key=lambda pair: pair[1].number)]  # type: ignore[union-attr]
+        parts: dict[str, Any] = {place: cell.t[0] for place, cell in env.items() if isinstance(cell, Cell) and cell.t}
+        moving = [place for place, node in parts.items() if isinstance(node, Node)]
+        order = sorted(moving, key=lambda place: parts[place].number)
         given: dict[str, list[str]] = {}
         for name, place in self.places:
             if isinstance(place, str):

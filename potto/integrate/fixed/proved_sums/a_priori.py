@@ -25,6 +25,7 @@ from potto.integrate.fixed.proved_sums.on_bounds import OnBounds, Place, Tied
 from potto.integrate.fixed.proved_sums.settled import SettledRegion, accurate
 from potto.integrate.fixed.proved_sums.sum_text import RepeatedSum
 from potto.integrate.fixed.regions import LOOSEST, Path, Places, known, region_of, settle
+from potto.integrate.fixed.steps.step_cells import step_cells
 from potto.integrate.fixed.steps.step_gradients import step_gradient
 from potto.integrate.fixed.steps.step_sums import SteppedCall
 from potto.integrate.fixed.straight import CLEAR, StraightIntegral, nothing
@@ -241,7 +242,7 @@ def proved_gradient(
 ) -> MovingTotals | None:
     """The value and its derivatives by the parameters in `moving`, swept back; None where the integral is not one of
     step functions, or something about it is not plain. machine: one without directions."""
-    if plan.steps is None or plan.choices is not None or _numbers(plan, env) is None or not _exact(plan, env):
+    if plan.steps is None or _numbers(plan, env) is None or not _exact(plan, env):
         return None
     if machine.frozen or machine.side or machine.costs is not None:
         return None
@@ -257,9 +258,12 @@ def _summed(plan: StraightIntegral, machine: Evaluator, env: dict[str, Value]) -
     if values is None or machine.frozen or machine.side:
         return None
     certain = machine.costs is None and _exact(plan, env)
-    if certain and plan.steps is not None and (stepped := SteppedCall(plan.steps, machine.tracking()).at(env)):
-        machine.count(stepped.nodes)
-        return stepped
+    if certain and plan.steps is not None:
+        if stepped := SteppedCall(plan.steps, machine.tracking()).at(env):
+            machine.count(stepped.nodes)
+            return stepped
+        if step_cells(plan.steps, machine.tracking(), env).fine:
+            return None  # one cell after the other would take the square of that, and leave as much
     frame = evaluated(plan.frames[0], machine.tracking(), env)
     reach, rtol = float(frame[1].v - frame[0].v), min(machine.rtol, LOOSEST)
     region = found.region if certain and (found := known(plan, values, reach, rtol)) else None

@@ -18,6 +18,7 @@ from msgspec import Struct
 from potto.core.terms import Const, children
 from potto.integrate.fixed.moving_sums import any_moves, evaluated
 from potto.integrate.fixed.steps.step_integral import StepIntegral
+from potto.integrate.fixed.steps.step_sides import Passed, Sides, layout, sides_of, taken
 from potto.integrate.fixed.straight import CLEAR
 from potto.integrate.pieces import Evaluator
 from potto.integrate.rules.gauss import EPS
@@ -36,8 +37,9 @@ class StepCells(Struct, frozen=True):
     low, width, off: (1 + k, [B,] C), with tangents: lower ends, widths, and how far both ends may be off. heights: of
     each step function its numbers on the cells and their errors, of that shape too, or (1, [B,] C) without tangents;
     None for errors of 0. moving: the directions in which ends move. fine: for whom all this is sure. inside: how many
-    are cells. lower, upper: ([B,] C), the rows of the frame that are the ends. below: ([B,] R), those that lie below
-    the lower bound.
+    are cells. lower, upper: ([B,] C), the rows of the frame that are the ends. passed, sides: where cuts come among the
+    cells, and surfaces change their signs. taken: of each step function which values of its choices are taken, ([B,] C)
+    each.
     """
 
     low: Array
@@ -49,14 +51,19 @@ class StepCells(Struct, frozen=True):
     inside: Ints
     lower: Ints
     upper: Ints
-    below: Bools
+    passed: Passed
+    sides: Sides
+    taken: tuple[tuple[Ints, ...], ...]
 
     def pick(self, cells: Any) -> StepCells:
         """Those at some places of the last axis, or of the last two."""
         low, width, off = (block[..., *cells] for block in (self.low, self.width, self.off))
         heights = tuple([(x[..., *cells], None if e is None else e[..., *cells]) for x, e in self.heights])
         lower, upper = self.lower[..., *cells], self.upper[..., *cells]
-        return StepCells(low, width, off, heights, self.moving, self.fine, self.inside, lower, upper, self.below)
+        taken = tuple([tuple([number[..., *cells] for number in own]) for own in self.taken])
+        return StepCells(
+            low, width, off, heights, self.moving, self.fine, self.inside, lower, upper, self.passed, self.sides, taken
+        )
 
     def levels(self) -> list[Cell]:
         """The step functions."""
@@ -67,28 +74,32 @@ def step_cells(plan: StepIntegral, machine: Evaluator, env: dict[str, Value], ba
     """The cells of one member, or of a batch. machine: one that keeps track of rounding."""
     frame = evaluated(plan.frame, machine, {name: env[name] for name in plan.frame.params})
     levels = levels_of(plan, machine, env)
-    return cells_between(plan, frame, levels, machine.directions, () if batch is None else (batch,))
+    return cells_between(plan, frame, levels, machine, env, machine.directions, () if batch is None else (batch,))
 
 
 def cells_between(
-    plan: StepIntegral, frame: Sequence[Cell], heights: Sequence[Sequence[Cell]], k: int, shape: tuple[int, ...] = ()
-) -> StepCells:
+    plan: StepIntegral, frame: Sequence[Cell], heights: Sequence[Sequence[Cell]], machine: Evaluator,
+    env: Mapping[str, Value], k: int, shape: tuple[int, ...] = (),
+) -> StepCells:  # fmt: skip
     """The cells between the rows of a frame, with tangents in k directions. heights: as of `levels_of`. shape: of the
     batch."""
     places, errors = _rows(frame, k, shape)
+    sides = sides_of(plan, places[0], machine, env)
+    _absent(places[0], errors[0])
     rows, count = _in_order(places[0], errors[0])
     ends, slack = _along(places, rows), _along(errors, rows)
     width, doubt = ends[..., 1:] - ends[..., :-1], slack[..., 1:] + slack[..., :-1]
-    fine = _apart(width[0], doubt[0], count)
-    below = places[0] < places[0, ..., :1]
+    passed = _passed(rows, count, plan.rows)
+    chosen = tuple([tuple([taken(plan, choice, sides, passed) for choice in step.choices]) for step in plan.steps])
     along = tuple([
-        _height(*(_numbers(plan, own) or _rows(levels, k, shape)), plan.steps[own], rows, below)
+        _height(plan, own, *(_numbers(plan, own) or _rows(levels, k, shape)), sides, passed, chosen[own])
         for own, levels in enumerate(heights)
     ])  # fmt: skip
     moving = tuple([any_moves(frame, d) for d in range(k)])
     return StepCells(
         ends[..., :-1], width, doubt + EPS * (np.abs(ends[..., 1:]) + np.abs(ends[..., :-1])), along,
-        moving, fine, count - 1, rows[..., :-1], rows[..., 1:], below,
+        moving, _apart(width[0], doubt[0], count) & sides.sure, count - 1, rows[..., :-1], rows[..., 1:],
+        passed, sides, chosen,
     )  # fmt: skip
 
 
@@ -103,18 +114,30 @@ def levels_of(plan: StepIntegral, machine: Evaluator, env: Mapping[str, Value]) 
 
 def _ends(plan: StepIntegral) -> list[int]:
     """Where the heights of each step function begin and end."""
-    return list(itertools.accumulate([1 + 2 * len(own) for own in plan.steps], initial=0))
+    return list(itertools.accumulate([step.heights for step in plan.steps], initial=0))
 
 
 @lru_cache(maxsize=512)
 def _numbers(plan: StepIntegral, own: int) -> tuple[Array, Array] | None:
-    """The heights of a step function as numbers that have no error and do not move, (1, R) each; None where they are
+    """What a step function is made of as numbers that have no error and do not move, (1, L) each; None where they are
     no such."""
     if not plan.resting[own]:
         return None
     levels = children(plan.heights.body)[slice(*_ends(plan)[own : own + 2])]
     numbers = np.array([[level.value for level in levels if isinstance(level, Const)]])
     return numbers, np.zeros(numbers.shape)
+
+
+@lru_cache(maxsize=512)
+def _whole(plan: StepIntegral, own: int) -> bool:
+    """Whether sums of what a resting step function is made of are exact."""
+    found = _numbers(plan, own)
+    return found is not None and _are_whole(*found)
+
+
+def _are_whole(numbers: Array, errors: Array) -> bool:
+    whole = not errors.any() and bool((numbers == np.rint(numbers)).all())
+    return whole and bool(np.abs(numbers).sum(axis=-1).max() < WHOLE)
 
 
 def _rows(cells: Sequence[Cell], k: int, shape: tuple[int, ...]) -> tuple[Array, Array]:
@@ -134,11 +157,25 @@ def _rows(cells: Sequence[Cell], k: int, shape: tuple[int, ...]) -> tuple[Array,
     return both[0], both[1]
 
 
+def _absent(places: Array, errors: Array) -> None:
+    """Of places ([B,] R) those at infinity of which it is not known how far they may be off: a quotient whose divisor
+    is 0. That is no root (nan) if the surface is clear of its rounding in the middle between its others: one that a
+    divisor of the size of its rounding has leaves no more there than that size times the farther bound, where both are
+    on one side of 0 at most twice the middle. Elsewhere it may be anywhere."""
+    unknown = np.isnan(errors)
+    if unknown.any():
+        unknown &= ~np.isnan(places)
+        low, high = places[..., :1], places[..., 1:2]
+        places[unknown & np.isinf(places) & ((low >= 0) | (high <= 0))] = np.nan
+        errors[unknown & ~np.isnan(places)] = np.inf
+
+
 def _in_order(places: Array, errors: Array) -> tuple[Ints, Ints]:
     """The rows from one bound to the other in order, ([B,] R), the upper bound again and again where cuts lie beyond
     these; how many there are, ([B])."""
     near = CLEAR * errors
-    away = places < places[..., :1] - near[..., :1] - near
+    away = np.isnan(places)
+    away |= places < places[..., :1] - near[..., :1] - near
     away |= places > places[..., 1:2] + near[..., 1:2] + near
     key = np.where(away, np.inf, places)
     key[..., 0], key[..., 1] = -np.inf, np.finfo(float).max  # what lies next to a bound counts as within
@@ -162,21 +199,47 @@ def _along(block: Array, rows: Ints) -> Array:
     return block.take(rows, axis=-1) if rows.ndim == 1 else np.take_along_axis(block, rows[None], -1)
 
 
-def _height(numbers: Array, errors: Array, cuts: Sequence[int], rows: Ints, below: Bools) -> Height:
-    """A step function on the cells, and how far that is off, with tangents if it has any: its height below all cuts,
-    and what it changes at those that are passed, further and further up. below: the rows below the lower bound."""
-    most = np.abs(numbers).sum(axis=-1, keepdims=True)
-    exact = not errors.any() and bool((numbers == np.rint(numbers)).all()) and most.max() < WHOLE
-    changes = np.zeros((len(numbers), *below.shape), dtype=float if exact else WIDE)
-    level = 1 + len(cuts)
-    changes[..., list(cuts)] = numbers[..., level:]
-    terms = _along(changes, rows[..., :-1])
-    terms[..., 0] = (changes * below).sum(axis=-1) + numbers[..., :level].sum(axis=-1, dtype=changes.dtype)
-    found = np.cumsum(terms, axis=-1)
+def _passed(rows: Ints, count: Ints, number: int) -> Passed:
+    """Where the rows of a frame, so many, come in their order ([B,] C + 1), of which so many count."""
+    cells = rows.shape[-1] - 1
+    place = np.full((*rows.shape[:-1], number + 1), cells)
+    if rows.ndim == 1:
+        place[rows[1 : int(count) - 1]] = np.arange(1, int(count) - 1)
+    else:
+        at = np.broadcast_to(np.arange(1, cells), (len(rows), cells - 1))
+        cut = at < count[:, None] - 1
+        np.put_along_axis(place, np.where(cut, rows[:, 1:-1], number), np.where(cut, at, cells), -1)
+    return Passed(place, cells)
+
+
+def _height(
+    plan: StepIntegral, own: int, numbers: Array, errors: Array, sides: Sides, passed: Passed, chosen: Sequence[Ints]
+) -> Height:
+    """A step function on the cells, and how far that is off, with tangents if it has any: its height on the first one,
+    and what it changes at the cuts that are passed, further and further up; then the values of choices."""
+    step = plan.steps[own]
+    exact = _whole(plan, own) if plan.resting[own] else _are_whole(numbers, errors)
+    kind: Any = float if exact else WIDE
+    if numbers.ndim == sides.sure.ndim + 1:
+        numbers = numbers[:, None]  # the same for all members
+    alone, level = list(step.alone), 1 + len(step.alone)
+    change = numbers[..., level : level + len(alone)].astype(kind)
+    first = numbers[..., :level].sum(axis=-1, dtype=kind) + (change * sides.first[..., alone]).sum(axis=-1)
+    rows, moves = layout(plan).rows[alone], change[..., None] * sides.change[..., alone, :]
+    found = passed.along(rows.reshape(-1), moves.reshape(*moves.shape[:-2], -1), first)
+    start = level + len(alone)
+    for choice, which in zip(step.choices, chosen, strict=True):
+        values = numbers[..., start : start + len(choice.values)]
+        found = found + np.take_along_axis(
+            np.broadcast_to(values, (*found.shape[:-1], values.shape[-1])), which[None], -1
+        )
+        start += len(choice.values)
     if exact:
         return found, None
     found = found.astype(float)
-    return found, EPS * np.abs(found) + 3 * below.shape[-1] * WIDE_EPS * most + errors.sum(axis=-1, keepdims=True)
+    most = np.abs(numbers).sum(axis=-1, keepdims=True)
+    rounded = 3 * plan.rows * WIDE_EPS * most + errors.sum(axis=-1, keepdims=True)
+    return found, EPS * np.abs(found) + rounded
 
 
 def _cell(number: Array, error: Array | None, k: int) -> Cell:

@@ -18,6 +18,7 @@ from potto.integrate.fixed.moving_sums import SUMMED, MovingTotals, evaluated, p
 from potto.integrate.fixed.steps.step_cells import WIDE, WIDE_EPS, StepCells, cells_between, levels_of
 from potto.integrate.fixed.steps.step_integral import StepIntegral
 from potto.integrate.fixed.steps.step_orders import StepProof, others, proved
+from potto.integrate.fixed.steps.step_sides import layout
 from potto.integrate.fixed.steps.step_sums import lit
 from potto.integrate.pieces import Evaluator, dense
 from potto.integrate.rules.gauss import EPS, gauss
@@ -43,7 +44,7 @@ def step_gradient(
     frame = evaluated(plan.frame, machine.taped(), {name: taped[name] for name in plan.frame.params})
     levels = levels_of(plan, machine.taped(), taped)
     still: dict[str, Value] = {name: Cell(cell.v, cell.e) for name, cell in env.items()}
-    cells = cells_between(plan, frame, levels, 0)
+    cells = cells_between(plan, frame, levels, machine, still, 0)
     if not cells.fine:
         return None
     cells = lit(cells, plan) if all(plan.resting) else cells.pick((slice(int(cells.inside)),))
@@ -57,13 +58,15 @@ def step_gradient(
         order = proof.order
     own = [name for name in plan.body.params if name in seeds]
     value, slopes = _on_cells(plan, cells, machine, still, own, order, proof)
-    answers = [(cell.t, part) for cell, part in zip(frame, _by_rows(cells, slopes, len(frame)).T, strict=True)]
+    ends = np.union1d(cells.lower, cells.upper).tolist()  # a root that is not there has no derivative
+    by_row = _by_rows(cells, slopes, len(frame))
+    answers = [(frame[row].t, by_row[:, row]) for row in ends]
     rising = [i for i, rests in enumerate(plan.resting) if not rests]
     for i, parts in zip(rising, np.moveaxis(slopes[:, ENDS:], 1, 0), strict=False):
-        by_height = _by_heights(cells, parts, plan.steps[i], len(frame))
+        by_height = _by_heights(plan, i, cells, parts)
         answers += [(cell.t, part) for cell, part in zip(levels[i], by_height.T, strict=True)]
     for name, parts in zip(own, np.moveaxis(slopes[:, ENDS + len(rising) :], 1, 0), strict=True):
-        answers.append(((seeds[name],), _total(parts)))  # type: ignore[arg-type]
+        answers.append(((seeds[name],), _total(parts)))
     found = _to_parameters(answers)
     rows = [_total(value), *(found.get(seed, np.zeros(3)) for seed in seeds.values())]
     number, error, gross = np.transpose(rows).tolist()
@@ -122,16 +125,27 @@ def _by_rows(cells: StepCells, slopes: Slopes, rows: int) -> Slopes:
     return found
 
 
-def _by_heights(cells: StepCells, parts: Slopes, cuts: Sequence[int], rows: int) -> Slopes:
-    """The derivatives by the heights of a step function as `StepIntegral` has them: those below all cuts count on all
-    cells, a change at a cut on those above it. parts: by the height on each cell, all of which there are."""
-    above = np.zeros((3, rows))
-    along = np.cumsum(parts[:, ::-1].astype(WIDE), axis=-1)[:, ::-1].astype(float)
-    along[1] += EPS * np.abs(along[0]) + 3 * parts.shape[-1] * WIDE_EPS * along[2]
-    total = along[:, :1]
-    above[:, cells.lower] = along
-    above[:, cells.below] = total
-    return np.concatenate([np.repeat(total, 1 + len(cuts), axis=1), above[:, list(cuts)]], axis=1)
+def _by_heights(plan: StepIntegral, own: int, cells: StepCells, parts: Slopes) -> Slopes:
+    """The derivatives by what a step function is made of (`StepFunction`): what is below all surfaces counts on all
+    cells, a change on those above its surface, a value where it is taken. parts: by the height on each cell, all of
+    which there are."""
+    step, sides, count = plan.steps[own], cells.sides, cells.passed.cells
+    along = np.zeros((3, 1 + count), dtype=WIDE)
+    along[:, : parts.shape[-1]] = np.cumsum(parts[:, ::-1].astype(WIDE), axis=-1)[:, ::-1]
+    total, alone = along[:, :1], list(step.alone)
+    by_row = along[:, cells.passed.place[layout(plan).rows[alone]]]  # (3, N, M)
+    above = total * sides.first[alone] + (by_row * sides.change[alone]).sum(axis=-1)
+    gross = (by_row * np.abs(sides.change[alone])).sum(axis=-1) + total * sides.first[alone]
+    above[1:] = gross[1:]
+    values = [
+        np.array([np.bincount(which, part, len(choice.values)) for part in parts])
+        for choice, which in zip(step.choices, cells.taken[own], strict=True)
+    ]
+    found = np.concatenate([np.repeat(total, 1 + len(alone), axis=1), above, *values], axis=1)
+    found[1] += 3 * parts.shape[-1] * WIDE_EPS * found[2]
+    slopes: Slopes = found.astype(float)
+    slopes[1] += PAIRWISE * slopes[2]
+    return slopes
 
 
 def _to_parameters(answers: Sequence[tuple[tuple[object, ...], Slopes]]) -> dict[Node, Slopes]:

@@ -16,6 +16,9 @@ from msgspec import Struct
 
 from potto.calculus.algebra.affine import affine
 from potto.calculus.algebra.degree import degree
+from potto.calculus.decomposition.conic_regions import polynomial
+from potto.calculus.decomposition.surface_cuts import WrittenSurface, all_sections, face_of
+from potto.calculus.surfaces.domains import ends_of_domain
 from potto.core.terms import (
     INF,
     ONE,
@@ -39,10 +42,35 @@ from potto.core.terms import (
     tuple_,
     var,
 )
+from potto.integrate.fixed.root_choices import choices_of, smooth
+from potto.integrate.fixed.steps.step_choices import Choice, choice_of
 from potto.integrate.rules.complex_enclosures import enclosable
 
 MOST_TERMS = 600  # of what is left where step functions have names
 BOUNDS = 2  # rows of a frame that come before its cuts
+
+
+class StepSurface(Struct, frozen=True):
+    """What a condition compares with 0. rows: of the frame, where it may change its sign. lead: of a polynomial with as
+    many roots as there are rows the coefficient of the highest power; None of others, which are asked between their
+    rows which sign they have."""
+
+    form: Term
+    rows: tuple[int, ...]
+    lead: Term | None
+
+
+class StepFunction(Struct, frozen=True, eq=False):
+    """What adds up to it. alone: surfaces of conditions that count on their own."""
+
+    alone: tuple[int, ...]
+    choices: tuple[Choice[int], ...]
+
+    @property
+    def heights(self) -> int:
+        """How many numbers it is made of: one by itself, one below each surface that counts on its own and by how much
+        it changes above it, then the values of choices."""
+        return 1 + 2 * len(self.alone) + sum(len(choice.values) for choice in self.choices)
 
 
 class StepIntegral(Struct, frozen=True, eq=False):
@@ -50,9 +78,10 @@ class StepIntegral(Struct, frozen=True, eq=False):
 
     frame: both bounds, then the cuts, each once. body: the integrand, with `names` for the step functions. dark:
     whether it is 0 where all of these are. degree: of the body in the variable, None where it is not a polynomial.
-    steps: per step function the rows of its cuts. heights: of one step function after the other what adds up to its
-    height below all cuts, a number by itself and one for each cut, then by how much it changes at each. resting: which
-    have nothing but numbers for heights. proofs: what was proved last (`step_orders`), by the accuracy.
+    surfaces: of all conditions. asked: what tells their sides: leading coefficients that are no numbers, then other
+    surfaces, each at as many places as stretches lie between its rows, under the names of `probe`. heights: of one step
+    function after the other what it is made of, as `StepFunction` says. resting: which have nothing but numbers there.
+    proofs: what was proved last (`step_orders`), by the accuracy.
     """
 
     variable: str
@@ -61,7 +90,9 @@ class StepIntegral(Struct, frozen=True, eq=False):
     names: tuple[str, ...]
     dark: bool
     degree: int | None
-    steps: tuple[tuple[int, ...], ...]
+    surfaces: tuple[StepSurface, ...]
+    asked: Lam
+    steps: tuple[StepFunction, ...]
     heights: Lam
     resting: tuple[bool, ...]
     proofs: dict[float, Any] = {}
@@ -71,42 +102,54 @@ class StepIntegral(Struct, frozen=True, eq=False):
         return len(children(self.frame.body))
 
 
+def probe(surface: int, stretch: int) -> str:
+    """The name of the place at which a surface is asked in a stretch between its rows."""
+    return f"#at{surface}'{stretch}"
+
+
 def step_integral(term: Integral, body: Term) -> StepIntegral | None:
-    """The integral in this form. None where a condition is not affine in the variable with a slope that is a number, or
-    counts in another way, and where what is left is not analytic by its form.
+    """The integral in this form. None where the places of a condition are no closed forms, or it counts in another way,
+    and where what is left is not analytic by its form.
 
     body: the integrand with calls carried out.
     """
-    if len(term.variables) != 1 or any(term.hints) or any(node is INF for node in postorder(*term.bounds[0])):
+    bounds = term.bounds[0]
+    plain = not any(term.hints) and bounds[0] is not bounds[1] and INF not in postorder(*bounds)
+    if len(term.variables) != 1 or not plain:
         return None
-    reading = _Reading(term.variables[0], body)
+    reading = _Reading(term, body)
     whole = reading.put_together(body)
     names = tuple(reading.names.values())
     if not names or len(postorder(whole)) > MOST_TERMS:
         return None
     steps, heights = zip(*map(reading.heights, reading.names), strict=True)
-    frame = tuple_((*term.bounds[0], *reading.rows))
-    levels = tuple_([height for own in heights for height in own])
-    if not all(map(enclosable, (whole, *children(frame), *children(levels)))):
+    frame, levels = tuple(reading.rows), tuple_([height for own in heights for height in own])
+    choices = choices_of(frame, {*postorder(term), *postorder(body)}, term.variables)
+    if not all(map(enclosable, (whole, *children(levels)))) or not smooth(frame, choices):
         return None
     dark = substitute(whole, dict.fromkeys(names, ZERO)) is ZERO
     resting = tuple([all(isinstance(height, Const) for height in own) for own in heights])
     return StepIntegral(
-        term.variables[0], function_of(frame), function_of(whole), names, dark, degree(whole, term.variables),
-        steps, function_of(levels), resting,
+        term.variables[0], function_of(tuple_(frame)), function_of(whole), names, dark, degree(whole, term.variables),
+        tuple(reading.surfaces), function_of(tuple_(reading.asked())), steps, function_of(levels), resting,
     )  # fmt: skip
 
 
 class _Reading:
-    """What is read off an integrand. rows: of the frame, by the cut. sides: by the surface its row, and whether it
-    increases along the variable. linear: the terms that are linear in conditions, with coefficients that do not depend
-    on the variable. names: of the step functions."""
+    """What is read off an integrand. rows: of the frame, by their terms. numbers: of surfaces, by their canonical
+    forms; None where they have none. linear: the terms that are linear in conditions, with coefficients that do not
+    depend on the variable. chosen: conditions that are values of such, or have such for values. names: of the step
+    functions."""
 
-    def __init__(self, variable: str, body: Term) -> None:
-        self.variable = variable
+    def __init__(self, term: Integral, body: Term) -> None:
+        (self.variable,) = term.variables
         self.rows: dict[Term, int] = {}
-        self.sides: dict[Term, tuple[int, bool] | None] = {}
+        for bound in term.bounds[0]:
+            self.rows.setdefault(bound, len(self.rows))
+        self.surfaces: list[StepSurface] = []
+        self.numbers: dict[Term, int | None] = {}
         self.linear: set[Term] = set()
+        self.chosen: set[Term] = set()
         self.names: dict[Term, str] = {}
         for node in postorder(body, below=lambda node: () if self._still(node) else children(node)):
             if not self._still(node) and self._is_linear(node):
@@ -118,8 +161,11 @@ class _Reading:
     def _is_linear(self, node: Term) -> bool:
         match node:
             case Branch():
-                still = self._still(node.then) and self._still(node.orelse)
-                return still and self._side(node.surface) is not None
+                if not all(self._still(case) or case in self.chosen for case in (node.then, node.orelse)):
+                    return False
+                if self._side(node.surface) is not None:
+                    self.chosen.add(node)
+                return node in self.chosen
             case Prim(op="add" | "neg"):
                 return all(arg in self.linear or self._still(arg) for arg in node.args)
             case Prim(op="mul"):
@@ -130,10 +176,34 @@ class _Reading:
         return False
 
     def _side(self, surface: Term) -> tuple[int, bool] | None:
-        if surface not in self.sides:
-            found = _cut(surface, self.variable)
-            self.sides[surface] = found and (self.rows.setdefault(found[0], BOUNDS + len(self.rows)), found[1])
-        return self.sides[surface]
+        """The number of a surface, and whether it is above 0 where its form is."""
+        face, turned = face_of(surface)
+        if face.key not in self.numbers:
+            self.numbers[face.key] = None
+            found = self._found(face)
+            if found is not None:
+                self.numbers[face.key] = len(self.surfaces)
+                self.surfaces.append(found)
+        number = self.numbers[face.key]
+        return None if number is None else (number, turned > 0)
+
+    def _found(self, face: WrittenSurface) -> StepSurface | None:
+        """A surface with its rows; None where these are no closed forms."""
+        found = _solved(face, self.variable)
+        return None if found is None else StepSurface(face.form, self._placed(found[0]), found[1])
+
+    def _placed(self, roots: Sequence[Term]) -> tuple[int, ...]:
+        return tuple(dict.fromkeys(self.rows.setdefault(root, len(self.rows)) for root in roots))
+
+    def asked(self) -> list[Term]:
+        """What tells the sides of the surfaces."""
+        leads = [s.lead for s in self.surfaces if s.lead is not None and not isinstance(s.lead, Const)]
+        return leads + [
+            substitute(surface.form, {self.variable: var(probe(number, stretch))})
+            for number, surface in enumerate(self.surfaces)
+            if surface.lead is None
+            for stretch in range(1 + len(surface.rows))
+        ]
 
     def put_together(self, body: Term) -> Term:
         """The integrand with names in place of step functions, as few as there may be."""
@@ -154,44 +224,59 @@ class _Reading:
     def _named(self, line: Term) -> Term:
         return var(self.names.setdefault(line, f"step'{len(self.names) + 1}"))
 
-    def heights(self, line: Term) -> tuple[tuple[int, ...], tuple[Term, ...]]:
-        """The rows of the cuts of a step function, and its heights as `StepIntegral` has them."""
-        cuts, heights = _heights(line, self.variable)
-        return tuple([self.rows[cut] for cut in cuts]), heights
+    def heights(self, line: Term) -> tuple[StepFunction, tuple[Term, ...]]:
+        """A step function, and what it is made of."""
+        keys, choices, heights = _heights(line, self.variable)
+        numbers = {key: number for key, number in self.numbers.items() if number is not None}
+        return StepFunction(tuple([numbers[key] for key in keys]), tuple(c.numbered(numbers) for c in choices)), heights
 
 
 # What follows from a surface or a step function alone is found once: one shader takes another's place.
 @lru_cache(maxsize=4096)
-def _cut(surface: Term, variable: str) -> tuple[Term, bool] | None:
-    """Where a surface that is affine in the variable cuts it, and whether it increases along it; None where its slope
-    is not a number."""
-    found = affine(surface, (variable,))
-    slope = found.coefficients[0] if found is not None else ZERO
-    if found is None or not isinstance(slope, Const) or slope.value == 0:
+def _solved(face: WrittenSurface, variable: str) -> tuple[tuple[Term, ...], Term | None] | None:
+    """The places at which a surface may change its sign, and what leads if it is a polynomial with no other roots; None
+    where they are no closed forms."""
+    line = affine(face.form, (variable,))
+    slope = line.coefficients[0] if line is not None else ZERO
+    if line is not None and isinstance(slope, Const) and slope.value != 0:
+        return (_root(line.rest, slope),), slope
+    if variable not in face.form.free or not enclosable(face.form):
         return None
-    return _root(found.rest, slope), slope.value > 0
+    ends = (end for end in ends_of_domain(face.form) if variable in end.free)
+    roots: dict[Term, None] = {}
+    for part in (face, *(WrittenSurface(end, end) for end in ends)):
+        found = all_sections(part, variable)
+        if found is None or found.families or found.pole_families:
+            return None
+        roots |= dict.fromkeys((*found.roots, *found.poles))
+    powers = polynomial(face.form, variable)
+    told = powers is not None and len(powers) == 1 + len(roots) and enclosable(powers[0])
+    return tuple(roots), powers[0] if powers and told else None
 
 
 @lru_cache(maxsize=256)
-def _heights(line: Term, variable: str) -> tuple[tuple[Term, ...], tuple[Term, ...]]:
-    """The cuts of a step function, and its heights as `StepIntegral` has them: many are added up by numbers alone, with
-    less rounding than that of a term."""
+def _heights(line: Term, variable: str) -> tuple[tuple[Term, ...], tuple[Choice[Term], ...], tuple[Term, ...]]:
+    """The surfaces that count on their own in a step function, and the choices, by the canonical forms of surfaces; and
+    what it is made of: many are added up by numbers alone, with less rounding than that of a term."""
     rest: list[Term] = []
-    parts: dict[Term, tuple[list[Term], list[Term]]] = {}
+    alone: dict[Term, tuple[list[Term], list[Term]]] = {}
+    choices: list[Choice[Term]] = []
+    values: list[Term] = []
     todo: list[tuple[Term, Term]] = [(line, ONE)]
     while todo:
         node, factor = todo.pop()
         match node:
             case _ if variable not in node.free:
                 rest.append(mul(factor, node))
-            case Branch():
-                side = _cut(node.surface, variable)
-                assert side is not None
-                cut, rising = side
-                below, above = (node.orelse, node.then) if rising else (node.then, node.orelse)
-                level, change = parts.setdefault(cut, ([], []))
+            case Branch() if variable not in node.then.free and variable not in node.orelse.free:
+                face, turned = face_of(node.surface)
+                above, below = (node.then, node.orelse) if turned > 0 else (node.orelse, node.then)
+                level, change = alone.setdefault(face.key, ([], []))
                 level.append(mul(factor, below))
                 change.append(mul(factor, sub(above, below)))
+            case Branch():
+                choices.append(choice_of(node, variable))
+                values += (mul(factor, value) for value in choices[-1].values)
             case Prim(op="mul"):
                 (part,) = [arg for arg in node.args if variable in arg.free]
                 todo.append((part, mul(factor, *_others(node.args, part))))
@@ -201,8 +286,8 @@ def _heights(line: Term, variable: str) -> tuple[tuple[Term, ...], tuple[Term, .
                 todo.append((node.args[0], neg(factor)))
             case _:
                 todo += [(arg, factor) for arg in children(node)]
-    levels, changes = zip(*parts.values(), strict=True)
-    return tuple(parts), (add(*rest), *(add(*own) for own in (*levels, *changes)))
+    own = [add(*parts) for each in zip(*alone.values(), strict=True) for parts in each]
+    return tuple(alone), tuple(choices), (add(*rest), *own, *values)
 
 
 def _root(rest: Term, slope: Const) -> Term:
