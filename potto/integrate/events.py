@@ -87,7 +87,7 @@ class Spot(Struct, frozen=True):
     outer: tuple[float, ...] = ()
 
 
-class Fold(Event, frozen=True):
+class SurfaceFold(Event, frozen=True):
     """Sections of a surface appear or merge. spots: where, for each of the members that met it; one for all where there
     is but one, or where it is inside."""
 
@@ -96,24 +96,24 @@ class Fold(Event, frozen=True):
 
     @property
     def key(self) -> object:
-        return Fold, self.cause
+        return SurfaceFold, self.cause
 
     def outside(self) -> Event:
-        return Fold(self.cause)
+        return SurfaceFold(self.cause)
 
     def spot(self, number: int) -> Spot:
         """Where the member is that has this place among those that met it."""
         return self.spots[number if len(self.spots) > 1 else 0]
 
     def at(self, places: Ints) -> Event:
-        return self if len(self.spots) == 1 else Fold(self.cause, tuple(self.spots[i] for i in places.tolist()))
+        return self if len(self.spots) == 1 else SurfaceFold(self.cause, tuple(self.spots[i] for i in places.tolist()))
 
     def joined(self, members: Members, other: Event, more: Members, both: Members) -> Event:
-        if both is None or members is None or more is None or not isinstance(other, Fold):
+        if both is None or members is None or more is None or not isinstance(other, SurfaceFold):
             return self
         known = {m: other.spot(i) for i, m in enumerate(more.tolist())}
         known |= {m: self.spot(i) for i, m in enumerate(members.tolist())}
-        return Fold(self.cause, tuple(known[m] for m in both.tolist()))
+        return SurfaceFold(self.cause, tuple(known[m] for m in both.tolist()))
 
 
 class Degenerate(Event, frozen=True):

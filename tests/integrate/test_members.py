@@ -17,7 +17,7 @@ from polygons import area, in_square
 
 import potto
 from potto.integrate.adaptive.iterated import Iteration
-from potto.integrate.events import Events, Fold, Spot, TwoSided
+from potto.integrate.events import Events, Spot, SurfaceFold, TwoSided
 
 TRIANGLE = """
 def covered(x0, y0, ax, ay, bx, by, cx, cy)
@@ -220,12 +220,12 @@ def test_members_along_every_axis_are_looked_at_in_all_directions_together(monke
 def test_places_of_folds_go_with_their_members() -> None:
     """Also of members that are named out of order, or twice; the first to name one says where it is."""
     cause, met = TwoSided("x", fold=True), Events()
-    met.note(Fold(cause, tuple(Spot(0, 0, place) for place in (5.0, 2.0, 5.5))), np.array([5, 2, 5]))
-    met.note(Fold(cause, (Spot(0, 0, 2.5), Spot(0, 0, 9.0), Spot(0, 0, 1.0))), np.array([2, 9, 1]))
-    ((event, members),) = met.every(Fold)
+    met.note(SurfaceFold(cause, tuple(Spot(0, 0, place) for place in (5.0, 2.0, 5.5))), np.array([5, 2, 5]))
+    met.note(SurfaceFold(cause, (Spot(0, 0, 2.5), Spot(0, 0, 9.0), Spot(0, 0, 1.0))), np.array([2, 9, 1]))
+    ((event, members),) = met.every(SurfaceFold)
     assert members is not None and members.tolist() == [1, 2, 5, 9]
     assert [event.spot(i).place for i in range(4)] == [1.0, 2.0, 5.0, 9.0]
-    ((some, kept),) = met.of(np.array([2, 3, 9])).every(Fold)
+    ((some, kept),) = met.of(np.array([2, 3, 9])).every(SurfaceFold)
     assert kept is not None and kept.tolist() == [0, 2] and [spot.place for spot in some.spots] == [2.0, 9.0]
 
 

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from fractions import Fraction
 
 from potto.calculus.algebra.ranges import Box, range_of
-from potto.calculus.algebra.rational_form import normal
+from potto.calculus.algebra.rational_form import equal
 from potto.calculus.explanation.brackets import constant
 from potto.calculus.explanation.factors import Factors, factored, written
 from potto.core.polynomials import size_of
@@ -137,10 +137,10 @@ def _of_size(node: Branch, tangents: frozenset[str], inside: frozenset[str]) -> 
     orelse = _replaced(node.orelse, neg(surface), size)
     if then == node.then or orelse == node.orelse:
         return None
-    if _is_zero(sub(then, orelse)):
+    if equal(then, orelse):
         return then
     vanishes = factored(then).powers.get(size, 0) > 0
-    if vanishes and surface.free.isdisjoint(inside) and _is_zero(add(then, orelse)):
+    if vanishes and surface.free.isdisjoint(inside) and equal(then, neg(orelse)):
         return written(factored(mul(prim("sign", surface), then)), tangents)
     return None
 
@@ -149,11 +149,6 @@ def _replaced(term: Term, old: Term, new: Term) -> Term:
     """With `new` for what is `old`, however it is written."""
 
     def change(_: Term, now: Term) -> Term:
-        return new if now.free == old.free and (now is old or _is_zero(sub(now, old))) else now
+        return new if now.free == old.free and (now is old or equal(now, old)) else now
 
     return transform(term, change)
-
-
-def _is_zero(term: Term) -> bool:
-    found = normal(term)
-    return found is not None and not found.top

@@ -21,7 +21,7 @@ import numpy as np
 from potto.integrate.decomposition.cuts import NARROW, Cuts
 from potto.integrate.decomposition.meetings import Meeting, SurfaceOnBound, as_array
 from potto.integrate.degenerate.scene import IteratedVariable, all_subsets
-from potto.integrate.events import Fold, Spot, TwoSided, on_a_bound
+from potto.integrate.events import Spot, SurfaceFold, TwoSided, on_a_bound
 from potto.integrate.levels import LevelPlan
 from potto.integrate.pieces import Sums, components, still
 from potto.integrate.rules.gauss import EPS
@@ -122,7 +122,7 @@ def note_folds(scene: IteratedVariable, cuts: Cuts) -> None:
         if members is not None:
             members, first = np.unique(members, return_index=True)
         spots = (Spot(number, fold.cut, float(x[i]), tuple(float(at[i]) for at in outer)) for i in first)
-        scene.machine.note(Fold(named, tuple(spots)), members)
+        scene.machine.note(SurfaceFold(named, tuple(spots)), members)
 
 
 def _apart(scene: IteratedVariable, owner: Ints) -> Ints:

@@ -26,7 +26,7 @@ from potto.integrate.decomposition.effective_range import reaches
 from potto.integrate.degenerate.degeneracies import BESIDE, does_jump
 from potto.integrate.elimination.interpolants import InterpolantTable, concentration, tabulated
 from potto.integrate.elimination.step_plans import HIGH, LOW, Eliminated
-from potto.integrate.events import Fold, TwoSided
+from potto.integrate.events import SurfaceFold, TwoSided
 from potto.integrate.levels import LevelPlan
 from potto.integrate.pieces import Evaluator, Sums, still
 from potto.integrate.plan import Plan
@@ -218,7 +218,7 @@ def _table(
         apart = wide.apart()
         sums = iteration.run(1, {**here, state.variable: Cell(x, None, tuple(speeds))}, x.size, {}, apart, together)
         if not len(speeds):  # at the ends of pieces: derivatives are not asked for
-            apart.events.forget(Fold, TwoSided)
+            apart.events.forget(SurfaceFold, TwoSided)
         machine.events.take(apart.events, None)
         return sums
 

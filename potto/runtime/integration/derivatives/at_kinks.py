@@ -10,7 +10,7 @@ from msgspec.structs import replace
 
 from potto.core.terms import children
 from potto.integrate.degenerate.kinks import lying_along
-from potto.integrate.events import BOUNDLESS, Along, Fold, OneSidedDerivatives, TwoSided
+from potto.integrate.events import BOUNDLESS, Along, OneSidedDerivatives, SurfaceFold, TwoSided
 from potto.integrate.pieces import Sums
 from potto.kernels.cells import Ints
 from potto.runtime.evaluation.derivatives.beside import parameter_step
@@ -34,7 +34,7 @@ def at_kinks(problem: Problem, sums: Sums) -> Sums:
         if problem.outermost:
             sums = _noted(problem, sums, cause, members)
         else:
-            machine.note(Fold(cause), members)
+            machine.note(SurfaceFold(cause), members)
     return sums
 
 

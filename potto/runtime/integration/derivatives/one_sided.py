@@ -26,10 +26,10 @@ from potto.integrate.events import (
     INNER,
     Degenerate,
     Events,
-    Fold,
     OneSidedDerivatives,
     Shortfall,
     Spot,
+    SurfaceFold,
     TwoSided,
 )
 from potto.integrate.pieces import Sums, gather, still
@@ -129,7 +129,7 @@ def _both_ways(cell: Cell) -> Cell:
 
 def at_folds(problem: Problem, order: Integral, sums: Sums) -> Sums:
     """With the derivatives where sections appear or merge just at the parameters."""
-    if problem.events.every(Fold):
+    if problem.events.every(SurfaceFold):
         beside_folds(problem, problem.plan(order), sums)
     return sums
 
@@ -142,7 +142,7 @@ def beside_folds(problem: Problem, plan: Plan, sums: Sums) -> None:
     machine, events = problem.machine, problem.events
     met = [
         (fold.cause, member, fold.spot(i))
-        for fold, who in events.every(Fold)
+        for fold, who in events.every(SurfaceFold)
         for i, member in enumerate(range(problem.batch) if who is None else who.tolist())
     ]
     places = [(member, spot) for _, member, spot in met]
@@ -167,7 +167,7 @@ def beside_folds(problem: Problem, plan: Plan, sums: Sums) -> None:
         et[:] = np.where(known, et, np.where(np.isfinite(t), np.where(np.isfinite(backward), *off), np.inf))
         _endless(problem, member, backward, forward, t, et)
         _note(problem, member, OneSidedDerivatives(cause, backward, forward, *off))
-    events.forget(Fold)
+    events.forget(SurfaceFold)
 
 
 def _note(problem: Problem, member: int, event: OneSidedDerivatives | Shortfall) -> None:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from potto.calculus.decomposition.elimination import eliminable
-from potto.integrate.events import Fold
+from potto.integrate.events import SurfaceFold
 from potto.integrate.pieces import Sums
 from potto.runtime.integration.methods.attempts import Attempt, accurate
 from potto.runtime.integration.problem import Problem
@@ -72,7 +72,7 @@ def _member(known: Eliminated, problem: Problem) -> Sums | None:
         return Sums.joined(rows)
 
     row = one_by_one(known, problem.plan(), problem.machine, problem.env, AFFORDABLE)
-    folds = problem.events.every(Fold)
+    folds = problem.events.every(SurfaceFold)
     if row is None or not folds or not all(_outermost(fold, known) for fold, _ in folds):
         return row
     try:
@@ -82,7 +82,7 @@ def _member(known: Eliminated, problem: Problem) -> Sums | None:
     return row
 
 
-def _outermost(fold: Fold, known: Eliminated) -> bool:
+def _outermost(fold: SurfaceFold, known: Eliminated) -> bool:
     """Whether a fold is one of a surface that cuts the outermost variable: the steps have cuts of their own."""
     level = known.plans[0].levels[0]
     own = {number for number, cut in enumerate(level.level.cuts) if cut.surface is fold.cause.surface}

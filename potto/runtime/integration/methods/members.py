@@ -16,7 +16,7 @@ from msgspec.structs import replace
 
 from potto.core.terms import Integral
 from potto.integrate.columns import run_of
-from potto.integrate.events import Along, Degenerate, Events, Fold, Shortfall, TwoSided, Unsearched
+from potto.integrate.events import Along, Degenerate, Events, Shortfall, SurfaceFold, TwoSided, Unsearched
 from potto.integrate.pieces import Sums
 from potto.kernels.cells import Array, Bools, Ints
 from potto.kernels.memory import kept
@@ -143,7 +143,7 @@ def _together(problem: Problem, todo: Ints, settled: Settled, found: Whole) -> l
         for group in (np.nonzero(kind)[0] for kind in (plain, *apart)):
             if group.size:
                 with here.among(group) as part:
-                    part.events.take(here.events.of(group, TwoSided, Fold, Along), np.arange(group.size))
+                    part.events.take(here.events.of(group, TwoSided, SurfaceFold, Along), np.arange(group.size))
                     own = settled(part, order, sums.pick(group))
                     rough = missing(problem.term, own, problem.machine.settings, part.env)
                     rough &= ~short[group]
@@ -171,9 +171,9 @@ def _together(problem: Problem, todo: Ints, settled: Settled, found: Whole) -> l
 def _kinds(events: Events, size: int) -> tuple[Bools, Bools, Bools, Bools] | None:
     """The members that want other variables innermost, those in trouble, those at folds, and those with two sides; None
     if nobody knows of something which of them met it."""
-    if not events.known(Degenerate, Shortfall, Unsearched, Fold, TwoSided):
+    if not events.known(Degenerate, Shortfall, Unsearched, SurfaceFold, TwoSided):
         return None
     turned = events.touched(size, Degenerate)
     trouble = events.touched(size, Shortfall, Unsearched) & ~turned
-    folded = events.touched(size, Fold) & ~turned & ~trouble
+    folded = events.touched(size, SurfaceFold) & ~turned & ~trouble
     return turned, trouble, folded, events.touched(size, TwoSided) & ~(turned | trouble | folded)

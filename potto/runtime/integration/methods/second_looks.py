@@ -12,7 +12,7 @@ import numpy as np
 from msgspec.structs import replace
 
 from potto.core.terms import Integral
-from potto.integrate.events import Degenerate, Fold, Shortfall, TwoSided, Unsearched
+from potto.integrate.events import Degenerate, Shortfall, SurfaceFold, TwoSided, Unsearched
 from potto.integrate.pieces import Sums
 from potto.kernels.cells import Array
 from potto.runtime.answers.convergence import ONLY_ROUNDED, missing
@@ -51,7 +51,7 @@ def by_less(problem: Problem, order: Integral, sums: Sums) -> Sums:
         settings = replace(machine.settings, rtol=max(rtol, machine.rtol), max_evals=most)
         loose = machine.apart().changed(settings=settings)
         other = in_parts(plan, loose, problem.env, problem.batch)
-        met = loose.events.touched(problem.batch, TwoSided, Fold, Degenerate).any()
+        met = loose.events.touched(problem.batch, TwoSided, SurfaceFold, Degenerate).any()
         if uncertainty(other) < uncertainty(sums) and not met:
             sums = other
         if uncertainty(sums) <= rtol:
@@ -77,7 +77,7 @@ def by_more(problem: Problem, order: Integral, sums: Sums) -> Sums:
         return sums
     strict = machine.changed(settings=replace(machine.settings, rtol=MORE * machine.rtol))
     found = attempted(problem.changed(machine=strict), order, math.ceil(2 * machine.record.spent))
-    if found.stopped or found.events.touched(problem.batch, TwoSided, Fold, Degenerate).any():
+    if found.stopped or found.events.touched(problem.batch, TwoSided, SurfaceFold, Degenerate).any():
         return sums
     other, value, rate = found.sums, found.sums.e < sums.e, found.sums.et < sums.et
     return replace(
