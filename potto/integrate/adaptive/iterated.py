@@ -21,6 +21,7 @@ from potto.integrate.decomposition.cuts import Cuts, at_rest, finite_speeds, fra
 from potto.integrate.decomposition.effective_range import Ranges, pulled_in, reaches
 from potto.integrate.decomposition.meetings import Row, as_array
 from potto.integrate.decomposition.sections import searched_rows
+from potto.integrate.decomposition.shells import shells
 from potto.integrate.decomposition.vanishing import vanishes
 from potto.integrate.degenerate.coincidences import count_places, count_slivers, note_folds
 from potto.integrate.degenerate.degeneracies import beneath, brush
@@ -220,7 +221,8 @@ class Iteration(Struct):
             rows = uncovered(level, rows, env, batch, machine, face)
         corners = corner_rows(level, env, lo, hi, batch, machine) if level.corners else []
         found, lost = self.searched(level, env, lo, hi, batch, machine)
-        return lo, hi, rows + corners + found, lost
+        rows = rows + corners + found
+        return lo, hi, rows + shells(lo, hi, rows, batch), lost
 
     def resting(self, level: LevelPlan, lo: Cell, hi: Cell, seg: Segments) -> bool:
         """Whether no nodes are to move with the cuts of a variable along which what is integrated is continuous.

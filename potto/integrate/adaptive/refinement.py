@@ -1,6 +1,8 @@
 """How far off pieces may be, which are not accurate enough, and which are as accurate as they can be.
 
-Owns `Tally`, `filled`, `too_coarse`, `stragglers`, `missed_peak` and `doubtful`. A piece is refined until its error is
+Owns `Tally`, `filled`, `too_coarse`, `stragglers`, `missed_peak`, `count_unreached` and `doubtful`.
+
+A piece is refined until its error is
 a small enough part of what it is added to, or until what is left of it is rounding. Where an integrand takes up little
 of its range, nodes that hardly count need less accuracy. Estimates see only what the nodes see, so the ends of segments
 and the agreement of two forms of each derivative are looked at besides.
@@ -11,6 +13,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from msgspec.structs import replace
 
 from potto.integrate.adaptive.reynolds import Totals, added
 from potto.integrate.columns import distinct
@@ -36,6 +39,7 @@ STUCK = 0.35
 NOISE = (1e-12, 1e-9)
 # Members that take longer than the others are left to be done by themselves if they are one in so many.
 STRAGGLERS = 16
+NARROWEST = 1e-14  # the part of its segment that a piece is to be halved at: no more of it than some doubles
 LEAST = 1e-6  # the relative accuracy that is asked of every node
 # How often all of a segment is halved whose two derivatives do not agree. What is as small as the last halves are has
 # been looked at that closely, as beside an end with a value of its own: 46 pieces there became 12,000.
@@ -164,7 +168,7 @@ def too_coarse(work: PanelBatch, p: Pieces, ends: Any, tally: Tally) -> Any:
     off, rounding = error.reshape(-1, p.segment.size), floor.reshape(-1, p.segment.size)
     bad = (off > tally.shares(work, owner)) & (off > 8 * rounding)
     bad = bad.any(axis=0) & ~noisy(p, np.where(bad, off, 0.0), tally.gross[owner], tally.whole(work)[:, owner])
-    wide = (p.u1 - p.u0) >= 1e-14
+    wide = (p.u1 - p.u0) >= NARROWEST
     waiting = np.zeros(bad.size, dtype=bool)
     if ends is not None:
         peak = missed_peak(work, p, ends) & wide
@@ -227,6 +231,29 @@ def missed_peak(work: PanelBatch, p: Pieces, ends: Ends) -> Any:
             off = np.abs(at_end - led[c]) - slack
             bad |= known & plain & (off > MISLED * p.tail[c] + 1e-8 * p.most[c])
     return bad
+
+
+def count_unreached(work: PanelBatch, p: Pieces, ends: Ends | None) -> Pieces:
+    """With what may sit at ends of segments that nodes come to nothing of, in the errors of pieces there.
+
+    One that is too narrow to be halved may hold as much as if it were as high as at its end all over; of derivatives
+    nothing is known then. Where nodes see nothing and the integral further in is off at the end, any may hold that.
+    """
+    if ends is None:
+        return p
+    seg, m = work.seg, work.width
+    reach = seg.b - seg.a
+    width = np.where(np.isinf(reach), 0.0, reach)[p.segment] * (p.u1 - p.u0)
+    narrow = p.u1 - p.u0 < NARROWEST
+    error = p.error.reshape(m, -1, p.segment.size).copy()
+    for f, off, touches in ((ends.low, ends.low_error, p.u0 == 0), (ends.high, ends.high_error, p.u1 == 1)):
+        height = np.abs(f[:, p.segment])
+        held = np.where(np.isfinite(height) & narrow & touches, height, 0.0) * width
+        held = np.where(held > PEAK * p.most, held, 0.0)
+        unseen = touches & (p.most == 0) & (width > 0) & (not work.last)
+        error[:, 0] += held + np.where(unseen, np.where(np.isfinite(height), off[:, p.segment] * width, np.inf), 0.0)
+        error[:, 1:] = np.where(held[:, None] > 0, np.inf, error[:, 1:])
+    return replace(p, error=error.reshape(p.error.shape))
 
 
 def doubtful(work: PanelBatch, p: Pieces, found: Totals) -> Any:

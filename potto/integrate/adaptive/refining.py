@@ -19,6 +19,7 @@ from potto.integrate.adaptive.divergence import endless, given_up
 from potto.integrate.adaptive.refinement import (
     DOUBTFUL_ROUNDS,
     Tally,
+    count_unreached,
     doubtful,
     filled,
     missed_peak,
@@ -73,7 +74,7 @@ def integrated(work: PanelBatch) -> Sums:
     if not work.last and (work.conflict or work.paired or seems_to_step(work, fresh)):
         work.steps = steps_at_cuts(work, fresh)
     if work.exact is None:
-        fresh = beside_short_ones(work, fresh)
+        fresh = count_unreached(work, beside_short_ones(work, fresh), ends)
     found = totals(work, fresh, ends)
     if good_enough(work, fresh, found, ends):
         return sums(work, found, ends)
@@ -84,7 +85,7 @@ def integrated(work: PanelBatch) -> Sums:
     if tally.settle_forms(work, done):
         done.excess[:] = 0.0
         done = refine(work, done, ends, tally)
-    done = at_seams(work, done)
+    done = count_unreached(work, at_seams(work, done), ends)
     for _ in range(DOUBTFUL_ROUNDS):
         found = totals(work, done, ends)
         bad = doubtful(work, done, found)
