@@ -347,7 +347,7 @@ FORMS = {
 def test_twice_as_many_of_any_form(form: str, batch: int) -> None:
     """Evaluations, and functions that are called, at parameters that are new at each call."""
     costs = []
-    for n in (10, 20, 40, 80):
+    for n in (5, 10, 20, 40, 80):
         ks = range(1, n + 1)
         if form == "union":
             integrand = f"exp(x)*[{' or '.join(f'abs(x - {k}*t/{n + 1}) < 0.3/{n}' for k in ks)}]"
