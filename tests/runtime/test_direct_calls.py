@@ -249,6 +249,19 @@ def test_batches_go_straight_to_the_integral(answered: list[bool]) -> None:
     assert answered == [True] * 4  # of the first call nothing is known
 
 
+def test_batches_go_there_whatever_passes_by_their_first_member(answered: list[bool]) -> None:
+    """The disc passes by the first pixels; all together have its area, and its derivative by the square of the
+    radius."""
+    text = "def f(a, b, r) integral ([a, a + 1/12], [b, b + 1/12]) [(x - 0.5)^2 + (y - 0.5)^2 < r] d(x, y)"
+    f = potto.grad(potto.compile(text).f, "r")
+    a, b = (z.ravel() for z in np.meshgrid(np.arange(12) / 12, np.arange(12) / 12))
+    for r in (0.1, 0.1, 0.11):
+        found = f(a, b, r)
+        assert abs(found.value.sum() - r * math.pi) <= found.error.sum() <= 1e-12
+        assert abs(found.tangent.sum() - math.pi) <= found.tangent_error.sum() <= 1e-10
+    assert answered == [True] * 2  # of the first call nothing is known
+
+
 def test_members_have_the_plan_of_their_batch(monkeypatch: pytest.MonkeyPatch) -> None:
     """A plan that holds for a batch is not looked for again for each of its members."""
     asked, own = [], Problem._plan

@@ -41,7 +41,7 @@ from potto.integrate.fixed.proved_sums.a_priori import proved_gradient, proved_s
 from potto.integrate.fixed.proved_sums.settled import SettledRegion
 from potto.integrate.fixed.steps.step_sums import SteppedCall
 from potto.integrate.fixed.straight import StraightIntegral
-from potto.kernels.cells import Cell, Env, Value, map_arrays, pad
+from potto.kernels.cells import Cell, Env, Value, all_arrays, map_arrays, pad
 from potto.kernels.making import making
 from potto.kernels.tape import Node
 from potto.runtime.answers.allowances import Allowance, allowance_of_one
@@ -55,7 +55,7 @@ from potto.runtime.integration.methods.choices import many, preferred, to_be_see
 from potto.runtime.integration.preparation.arrays import met
 from potto.runtime.integration.preparation.compared import compares
 from potto.runtime.integration.preparation.prepared import filled, placed, prepared
-from potto.runtime.integration.problem import Mixed, Problem, linked
+from potto.runtime.integration.problem import MOST_LOOKED_AT, Mixed, Problem, linked
 from potto.runtime.integration.settled_calls import Batches, SettledCall, SweptCall, unused
 from potto.runtime.integration.solving import solve
 
@@ -184,8 +184,7 @@ class Direct(Struct, frozen=True):
                 self.rules.clear()
             with making:
                 try:
-                    first = {n: map_arrays(_off_the_tape(v), lambda a: float(a.flat[0])) for n, v in here.items()}
-                    self.rules[key] = self._rule(working, first)
+                    self.rules[key] = self._rule(working, {n: _off_the_tape(v) for n, v in here.items()})
                 except _Passed:
                     return here, None
         return here, self.rules[key]
@@ -206,8 +205,10 @@ class Direct(Struct, frozen=True):
 
     def _rule(self, machine: Machine, env: dict[str, Value]) -> StraightIntegral | None:
         """The rule that the general way would come to for all numbers, if it is proved. Raises _Passed where at these
-        ones it need not be made."""
-        reach = machine.linker.reach
+        ones it need not be made: of many members nobody asks that, and the general way makes it for them as well."""
+        reach, members = machine.linker.reach, _members(env)
+        if members <= MOST_LOOKED_AT:
+            env, members = {n: map_arrays(v, lambda a: float(a.flat[0])) for n, v in env.items()}, 1
         try:
             term, full = filled(self.term, env, reach)
             if full is not env or met(term, env, reach) or compares(term, env, reach):
@@ -215,7 +216,7 @@ class Direct(Struct, frozen=True):
             again = machine.directions > 0
             if placed(term, again, reach) is not term or prepared(term, reach) is not term:
                 return None
-            problem = Problem(machine.apart(), term, *linked(env), solve, 1, True)
+            problem = Problem(machine.apart(), term, *linked(env), solve, members, True)
             if many(problem):
                 return None
             # between planes the rule is by far the shortest way
@@ -237,6 +238,11 @@ def _off_the_tape(value: Value) -> Value:
 def _batched(env: Mapping[str, Value]) -> bool:
     """Whether some of the parameters are arrays."""
     return any(type(value) is Cell and value.arrays() for value in env.values())
+
+
+def _members(env: Mapping[str, Value]) -> int:
+    """How many members a batch has with these parameters."""
+    return math.prod(np.broadcast_shapes(*(a.shape for value in env.values() for a in all_arrays(value))))
 
 
 class _Passed(Exception):
