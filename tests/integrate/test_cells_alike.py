@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 import potto
+from potto.integrate.fixed.cells.product_rule import ProductRule
 from potto.integrate.fixed.lowered.cells import places_of
 from potto.kernels.cells import Cell
 
@@ -122,6 +123,30 @@ def test_a_disc_turns_where_pixels_meet(backend: Any) -> None:
     assert abs(answer.tangent[turned][0] - angle / 2) <= answer.tangent_error[turned][0] <= 1e-12
     area = (mp.mpf(0.1) * angle - (mp.mpf("0.5") - mp.mpf(3) / 16) ** 2 * mp.tan(angle)) / 2
     assert abs(answer.value[turned][0] - area) <= answer.error[turned][0] <= 1e-14
+
+
+@pytest.mark.parametrize("backend", ["numpy", "native"])
+def test_few_cells_that_are_left_take_one_rule_more(backend: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of a disc on pixels most cells are done by the first rule. Of the others each rule with a few nodes more would
+    leave a few: they get at once as many as make little difference beside those of all."""
+    if backend == "native":
+        pytest.importorskip("llvmlite")
+    text = "def f(a, b, r) integral ([a, a + 1/16], [b, b + 1/16]) [(x - 0.5)^2 + (y - 0.5)^2 < r] d(x, y)"
+    a, b = (z.ravel() for z in np.meshgrid(np.arange(16) / 16, np.arange(16) / 16))
+    cells: list[int] = []
+    applied = ProductRule.applied
+
+    def counted(self: ProductRule, env: Any, index: Any) -> Any:
+        cells.append(index.size)
+        return applied(self, env, index)
+
+    monkeypatch.setattr(ProductRule, "applied", counted)
+    with potto.settings(backend=backend):
+        answer = potto.grad(potto.compile(text).f, "r")(a, b, 0.1)
+    first, left, *turning = cells
+    assert first > 50 and 2 < left < first / 4 and turning == [2, 2]  # left and right of the centre
+    assert abs(answer.value.sum() - 0.1 * math.pi) <= answer.error.sum() <= 1e-13
+    assert abs(answer.tangent.sum() - math.pi) <= answer.tangent_error.sum() <= 1e-11
 
 
 def test_cuts_that_are_one_and_move_apart_have_two_sides() -> None:

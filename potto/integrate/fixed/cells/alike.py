@@ -14,8 +14,9 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
+from msgspec.structs import replace
 
-from potto.integrate.fixed.cells.product_rule import CANCELS, FEW, ProductRule, added_together, way_of
+from potto.integrate.fixed.cells.product_rule import CALL, CANCELS, FEW, ProductRule, added_together, way_of
 from potto.integrate.fixed.cells.proved_shapes import proved_rules
 from potto.integrate.fixed.cells.topologies import Alike, topologies
 from potto.integrate.fixed.moving_sums import evaluated
@@ -32,6 +33,8 @@ MEMBERS, POINTS = 1 << 16, 1 << 15
 # How many members tell the order for all, where there are many, and for how many of them it must do.
 PILOTS = 16
 ENOUGH = 0.9
+# How many nodes rules for a few cells that are left may have, beside those for all, to do for them in one go.
+BESIDE = 0.25
 # The one whose coefficients tell of those before as well, and the first one that few cells get.
 PROBE = 2
 # What rounding may leave where what is added up cancels, as a part of that, in the end (`convergence`): of 18,233 pairs
@@ -147,11 +150,21 @@ def _settled(
         todo = np.concatenate((_applied(rules, env, total, fine), todo)) if rules else todo
         if not todo.size:
             return fine
-    for rule in _tried(plan, exact, machine, env, cell, todo, tight):
-        todo = _applied([(rule, todo)], env, total, fine)
-        if not todo.size:
-            break
+    tried, most = _tried(plan, exact, machine, env, cell, todo, tight), 0.0
+    while tried and todo.size:
+        number = _last_worth(tried, todo.size, most)
+        rule = replace(tried[number], skipped=tuple([own.orders for own in tried[:number]]))
+        most = max(most, BESIDE * rule.nodes * todo.size)
+        todo, tried = _applied([(rule, todo)], env, total, fine), tried[number + 1 :]
     return fine
+
+
+def _last_worth(rules: Sequence[ProductRule], cells: int, most: float) -> int:
+    """The place of the rule by which so many cells, that are left by others, are most likely done without one more: the
+    first one, or a later one that takes fewer nodes more than another call is worth, and at most so many."""
+    least = rules[0].nodes
+    later = (n for n, rule in enumerate(rules) if (rule.nodes - least) * cells < CALL and rule.nodes * cells <= most)
+    return max(later, default=0)
 
 
 def _applied(

@@ -15,7 +15,7 @@ import numpy as np
 from msgspec import Struct
 
 from potto.integrate.columns import distinct, places_of
-from potto.integrate.fixed.cells.product_rule import ProductRule, way_of
+from potto.integrate.fixed.cells.product_rule import CALL, ProductRule, way_of
 from potto.integrate.fixed.cells.topologies import Alike
 from potto.integrate.fixed.regions import LOOSEST, MARGIN, MOST_REGIONS
 from potto.integrate.fixed.straight import RowNumbers, StraightIntegral, rows_between
@@ -34,8 +34,6 @@ LEAST, FEW, FINEST = 32, 8, 5
 NARROWEST = 2.0**-6
 # Nodes per variable are multiples of this: rules that differ in a node take longer to be called than they save.
 EVEN = 2
-# A rule more takes as long as so many nodes: 10 us by machine code, 0.3 ms by numpy.
-CALL = 1 << 14
 
 
 class _Grid(Struct, frozen=True):
