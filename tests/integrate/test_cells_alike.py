@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 import potto
+from potto.integrate.fixed.cells import proved_shapes
 from potto.integrate.fixed.cells.product_rule import ProductRule
 from potto.integrate.fixed.lowered.cells import places_of
 from potto.kernels.cells import Cell
@@ -96,6 +97,24 @@ def test_what_is_proved_for_a_batch_is_known_of_others() -> None:
     with potto.settings(backend="numpy"):
         assert slope(c).compile_seconds > 0
         assert [slope(c + d).compile_seconds for d in (0.0, 1e-4, 2e-3)] == [0.0] * 3
+
+
+def test_where_nothing_can_be_proved_nobody_tries_twice(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of pixels all along a circle: in a region as large as it has to be for so few, the circle turns."""
+    text = "def f(a, b, r) integral ([a, a + 1/512], [b, b + 1/512]) [(x - 0.5)^2 + (y - 0.5)^2 < r] d(x, y)"
+    a, b = (z.ravel() for z in np.meshgrid(np.arange(512) / 512, np.arange(512) / 512))
+    f, proofs, tried = potto.grad(potto.compile(text).f, "r"), proved_shapes._proofs, list[int]()
+
+    def counted(*given: Any) -> Any:
+        found = proofs(*given)
+        tried.append(found[0].max())
+        return found
+
+    monkeypatch.setattr(proved_shapes, "_proofs", counted)
+    for r in (0.1, 0.1, 0.1001):
+        found = f(a, b, r)
+        assert abs(found.value.sum() - r * math.pi) <= found.error.sum() <= 1e-11
+    assert tried == [0]
 
 
 @pytest.mark.parametrize("order", ["x, y", "y, x"])

@@ -57,7 +57,8 @@ def proved_rules(
 ) -> tuple[list[tuple[ProductRule, Ints]], Ints]:
     """Rules with the cells that they are for, and the cells for which there are none.
 
-    exact: the nodes of variables in which the integrand is a polynomial.
+    exact: the nodes of variables in which the integrand is a polynomial. Where nothing was proved of cells between the
+    same rows, nothing is tried for others with parameters in the same regions.
     """
     count, everybody = cell.members.size, np.arange(cell.members.size)
     if count < FEW or any(map(any, cell.turning)):
@@ -69,11 +70,18 @@ def proved_rules(
     grid = _grid(values, count)
     if grid is None:
         return [], everybody
+    many = shapes[np.bincount(shape) >= grid.least]
+    key = (cell.face, many.tobytes(), grid, _box(values, grid), machine.rtol, machine.directions > 0)
+    if not many.size or key in plan.regions:
+        return [], everybody
     region, places = _regions(values, grid, count)
     kind = shape * places.shape[1] + region
     counts = np.bincount(kind, minlength=shapes.size * places.shape[1])
     nodes, error = _proofs(plan, stretches, exact, grid, places, counts, machine)
     if not nodes.any():
+        if len(plan.regions) >= MOST_REGIONS:
+            plan.regions.clear()
+        plan.regions[key] = None
         return [], everybody
     beyond = np.empty((1 + machine.directions, count))
     beyond[0] = error.take(kind)
@@ -188,6 +196,12 @@ def _grid(values: dict[str, Number], count: int) -> _Grid | None:
         radii.append(max(0.5 * width, narrow))
         narrowest = min(narrowest, radii[-1] / narrow * NARROWEST)  # of the power of two above the size
     return _Grid(FEW if moving < 2 else 2 * LEAST, tuple(ends), tuple(widths), tuple(radii), narrowest)
+
+
+def _box(values: dict[str, Number], grid: _Grid) -> tuple[tuple[int, int], ...]:
+    """The first and the last place in the grid along each parameter of some cells."""
+    widths = zip(values.values(), grid.width, strict=True)
+    return tuple([(math.floor(np.min(x) / width), math.floor(np.max(x) / width)) for x, width in widths])
 
 
 def _regions(values: dict[str, Number], grid: _Grid, cells: int) -> tuple[Ints, Ints]:
