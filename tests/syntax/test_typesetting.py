@@ -65,6 +65,15 @@ def test_a_choice_breaks_before_its_sides_and_a_size_stays_whole() -> None:
     assert second.lstrip().startswith("+ |x − t|")
 
 
+def test_meanings_break_between_them() -> None:
+    formula = "let D = b^2 - 4*a*c; x1 = -(b + sqrt(D))/(2*a); x2 = (sqrt(D) - b)/(2*a) in x1*da + x2*db"
+    assert [line.strip() for line in broken("D f = ", formula, 60)] == [
+        "D f = let D = b^2 - 4*a*c; x1 = -(b + sqrt(D))/(2*a);",
+        "x2 = (sqrt(D) - b)/(2*a) in",
+        "x1*da + x2*db",
+    ]
+
+
 def test_conditions_break_where_they_are_joined() -> None:
     """And not within one of them, although it is a sum."""
     formula = "(r*dr + (x - t)*dt)/sqrt(r^2 - t^2)*[t^2 + x^2 <= r^2 + 2*t*x and r^2 + 2*t*x < t^2 + x^2 + 4]"

@@ -11,7 +11,7 @@ from itertools import pairwise
 _SIGNS = (" + ", " - ", " − ")
 _SIDES = (" then ", " else ")
 _JOINTS = (" and ", " or ", " ∧ ", " ∨ ")
-_LET, _WHERE = "let ", " where "
+_LET, _IN, _WHERE = "let ", " in ", " where "
 _FACTORS = ("·", "*")
 _OUTSIDE = -1
 _SHORT = 40  # characters between parentheses that stay together
@@ -41,17 +41,20 @@ def _broken(line: str, start: int, indent: int, width: int, deep: int) -> list[s
     return [*lines, *_broken(now, begun, indent + 2, width, deep + 1)]
 
 
-def _beside_meanings(text: str) -> int | None:
-    """Where a formula goes on behind what its names stand for, or ends before that."""
-    place = text.find(" in ") + len(" in") if text.startswith(_LET) else text.rfind(_WHERE)
-    return place if place > 0 else None
+def _beside_meanings(text: str) -> list[int]:
+    """Where a formula goes on behind what its names stand for, or ends before that; of these alone, where each ends."""
+    if not text.startswith(_LET):
+        place = text.rfind(_WHERE)
+        return [place] if place > 0 else []
+    place = text.find(_IN)
+    return [place + len(_IN) - 1] if place > 0 else [i + 1 for i, char in enumerate(text) if char == ";"]
 
 
 def _places(text: str) -> list[int]:
     """Where to break: beside what names stand for, before the sides of a choice, the signs of one sum, conditions that
     are joined, or factors."""
-    if (meanings := _beside_meanings(text)) is not None:
-        return [meanings]
+    if meanings := _beside_meanings(text):
+        return meanings
     choices: dict[int, list[int]] = {}
     sums: dict[int, list[int]] = {}
     joints: dict[int, list[int]] = {}
