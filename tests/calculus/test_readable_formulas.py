@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from math import log
+
 import pytest
+from formulas import Shown
 
 from potto.calculus.explanation.explain import explain_derivative
 from potto.calculus.explanation.readable import readable
@@ -260,3 +264,28 @@ def test_a_size_whose_sign_conditions_tell_is_written_without_bars(body: str, re
     file = library.put("<text>", f"def f(t, v) {body}\n")
     found = explain_derivative(library.db, file, "f").tangent
     assert read in found and "abs" not in found and "sign" not in found
+
+
+SIZES = [
+    ("[x*y < t]*y", "abs(t)/x^2*[t*x > 0 and t/x < 1]", lambda t: 1 - abs(t)),
+    ("[x*y < t]*y^2", "1/(x^2*abs(x))*[t*x > 0 and t/x < 1]", lambda t: (1 - t * t) / 2),
+    ("[x*y > -t]*y", "abs(t)/x^2*[t*x < 0 and t/x > -1]", lambda t: 1 - abs(t)),
+]
+
+
+@pytest.mark.parametrize(("integrand", "read", "slope"), SIZES)
+def test_signs_that_two_brackets_tell_make_sizes(integrand: str, read: str, slope: Callable[[float], float]) -> None:
+    """At x*y = t, where both have the sign of t or, of -t, one of them has the other: the integral of |t|^n/|x|^(n + 1)
+    over |x| from |t| to 1. To 1e-8, which is what the integral over x is asked for."""
+    shown = Shown(f"def f(t) integral ([-1, 1], [0, 1]) {integrand} d(x, y)\n", "f")
+    assert read in shown.text.tangent and "[x > 0]" not in shown.text.tangent
+    assert shown.problems() == []
+    for t in (0.25, -0.5):
+        assert shown.module().eval(f"shown_1({t}, 1)").value == pytest.approx(slope(t), abs=1e-8)
+
+
+def test_a_sign_under_an_integral_makes_a_size() -> None:
+    """The slope of the area where x*y < t is 2*log(1/|t|)."""
+    shown = Shown("def f(t) integral ([-1, 1], [-1, 1]) [x*y < t] d(x, y)\n", "f")
+    assert "1/abs(x)*[" in shown.text.tangent
+    assert shown.module().eval("shown_1(-0.25, 1)").value == pytest.approx(2 * log(4), abs=1e-8)

@@ -1,6 +1,6 @@
 """Iverson brackets as conditions, in as few and as plain comparisons as they can be told.
 
-Owns `Inequality`, `conditions`, `fewer`, `between`, `plainer`, `sign_where`, `constant`, `implies`,
+Owns `Inequality`, `conditions`, `fewer`, `between`, `plainer`, `sign_where`, `two_sides`, `constant`, `implies`,
 `bracket`. A root is compared by squares or by what it is the root of, factors that do not change a sign are left out,
 and so is what another condition implies. What two conditions hold between numbers stands between them:
 `-1 < c + x < 0` is c < -x and c + x + 1 > 0.
@@ -192,6 +192,22 @@ def opposite(first: Inequality, second: Inequality) -> bool:
     """Whether one surface is the other with its sign turned."""
     found = normal(add(first.surface, second.surface))
     return first.strict and second.strict and found is not None and not found.top
+
+
+def two_sides(term: Term) -> Term | None:
+    """u, where a term is [u > 0] - [u < 0]."""
+    match term:
+        case Prim(op="add", args=(first, Prim(op="neg", args=(second,)))):
+            pass
+        case Prim(op="add", args=(Prim(op="neg", args=(second,)), first)):
+            pass
+        case _:
+            return None
+    match conditions(first), conditions(second):
+        case [one], [other] if opposite(one, other):
+            return one.surface
+        case _:
+            return None
 
 
 def _plain(item: Inequality, box: Box) -> list[Inequality]:

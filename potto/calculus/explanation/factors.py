@@ -6,14 +6,23 @@ Owns `Factors`, `factored` and `written`. Roots are powers of a half, brackets a
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Sequence
 from fractions import Fraction
 from math import gcd
 
 from msgspec import Struct
 
 from potto.calculus.algebra.ranges import range_of
-from potto.calculus.explanation.brackets import NEVER, Inequality, bracket, conditions, constant, fewer, sign_where
+from potto.calculus.explanation.brackets import (
+    NEVER,
+    Inequality,
+    bracket,
+    conditions,
+    constant,
+    fewer,
+    sign_where,
+    two_sides,
+)
 from potto.core.polynomials import Exact, number, over
 from potto.core.printer import format_term
 from potto.core.terms import (
@@ -170,20 +179,39 @@ def _tidied(known: Factors) -> Factors:
                 found.powers[base] = exponent - 1
         if is_parity(base):
             found.times(base, exponent % 2 - exponent)
-        if isinstance(base, Prim) and base.op == "sign":
-            _signed(found, base)
+        if (inner := _signed_by(base)) is not None:
+            _signed(found, base, inner)
         if isinstance(base, Prim) and base.op == "abs" and exponent.denominator == 1:
             _sized(found, base, int(exponent))
     return found
 
 
 def _sized(found: Factors, size: Prim, exponent: int) -> None:
-    """abs(v) as v or -v where the conditions tell the sign of v."""
-    told = sign_where(found.conditions, size.args[0])
+    """abs(v) as v or -v where the conditions tell the sign of v, and t/(v*abs(v)) as abs(t)/v^2 where t*v > 0."""
+    inner = size.args[0]
+    told = sign_where(found.conditions, inner)
     if told is not None:
         found.times(size, -exponent)
-        found.times(size.args[0], exponent)
+        found.times(inner, exponent)
         found.coefficient *= told[0] ** abs(exponent)
+        return
+    if exponent % 2 == 0 or found.powers.get(inner, 0) % 2 != 1:
+        return
+    for base, side in _of_one_sign(found.conditions, inner):
+        own = found.powers.get(base, 0)
+        if base != inner and own % 2 == 1:
+            found.times(size, -exponent)
+            found.times(inner, exponent)
+            _by_size(found, base, side)
+            return
+
+
+def _by_size(found: Factors, base: Term, side: int) -> None:
+    """A factor times its sign, or with -1 the other one."""
+    step = 1 if found.powers[base] > 0 else -1
+    found.coefficient *= side
+    found.times(base, -step)
+    found.times(prim("abs", base), step)
 
 
 def is_parity(base: Term) -> bool:
@@ -191,28 +219,46 @@ def is_parity(base: Term) -> bool:
     return isinstance(base, Prim) and base.op == "pow" and base.args[0] == const(-1.0)
 
 
-def _signed(found: Factors, sign: Prim) -> None:
+def _signed_by(base: Term) -> Term | None:
+    """What a factor is the sign of, in one word or by two brackets."""
+    return base.args[0] if isinstance(base, Prim) and base.op == "sign" else two_sides(base)
+
+
+def _signed(found: Factors, sign: Term, inner: Term) -> None:
     """sign(v) v is abs(v), the square of a sign is 1, and so is a sign that the conditions tell."""
-    (inner,) = sign.args
-    odd = found.powers.pop(sign).numerator % 2
-    own = found.powers.get(inner, 0)
-    if not odd:
+    if not found.powers.pop(sign).numerator % 2:
         return
+    turned, named = 1, sign
     match inner:
         case Branch(coordinates=(surface,), then=Const(value=a), orelse=Const(value=b)) if a * b < 0:
-            inner = surface
-            found.coefficient *= 1 if a > b else -1
-            sign = prim("sign", inner)
+            inner, turned = surface, 1 if a > b else -1
+            named = prim("sign", inner)
+        case _ if is_negative(inner):
+            inner, turned = neg(inner), -1
+            named = prim("sign", inner)
     told = sign_where(found.conditions, inner)
     if told is not None:
-        found.coefficient *= told[0]
+        found.coefficient *= told[0] * turned
         found.conditions = told[1]
         return
-    if not own or own.denominator != 1:
-        found.powers[sign] = 1
-        return
-    found.times(inner, -1 if own > 0 else 1)
-    found.times(prim("abs", inner), 1 if own > 0 else -1)
+    alike = [(base, side, found.powers.get(base, 0)) for base, side in _of_one_sign(found.conditions, inner)]
+    for base, side, own in sorted(alike, key=lambda each: each[2] % 2 == 0):  # abs(v)/w^2 before v/(w*abs(w))
+        if own and own.denominator == 1:
+            _by_size(found, base, side * turned)
+            return
+    two = two_sides(sign) is not None  # no `sign` may stand there
+    found.coefficient *= 1 if two else turned
+    found.powers[sign if two else named] = 1
+
+
+def _of_one_sign(known: Sequence[Inequality], term: Term) -> Iterator[tuple[Term, int]]:
+    """Whatever has the sign of a term, or with -1 the other one: itself, and t for x where t*x > 0."""
+    yield term, 1
+    for item in known:
+        found = factored(item.surface)
+        odd = [base for base, n in found.powers.items() if n.denominator == 1 and n % 2]
+        if item.strict and term in odd and len(odd) == 2 and not found.conditions:
+            yield odd[1 - odd.index(term)], 1 if found.coefficient > 0 else -1
 
 
 # Writing
