@@ -53,6 +53,62 @@ def test_the_formula_has_the_slope_of_the_integral_between_the_roots(
     assert shown.module().eval(f"shown_1({arguments})").value == pytest.approx(slope, rel=1e-10, abs=1e-12)
 
 
+BOTH = "let D = b^2 - 4*a*c; u1 = -(b + sqrt(D))/(2*a); u2 = (sqrt(D) - b)/(2*a) in if [D > 0] then -("
+
+
+@pytest.mark.parametrize(
+    ("surface", "root"),
+    [
+        ("a*exp(2*x) + b*exp(x) + c", "(u1*da + db + dc/u1)*["),
+        ("a*exp(x)^2 + b*exp(x) + c", "(u1*da + db + dc/u1)*["),
+        ("a*log(x)^2 + b*log(x) + c", "exp(u1)*(u1^2*da + u1*db + dc)*["),
+        ("a*sin(x)^2 + b*sin(x) + c", "(u1^2*da + u1*db + dc)/sqrt(1 - u1^2)"),
+        ("a*x^4 + b*x^2 + c", "(u1^2*da + u1*db + dc)/(2*sqrt(u1))"),
+    ],
+)
+def test_roots_of_what_is_quadratic_in_a_function(surface: str, root: str) -> None:
+    """u = exp(x) moves by -(u^2*da + u*db + dc) over the slope, and x by dx/du = 1/u times that; others alike."""
+    shown = Shown(f"def f(a, b, c) integral [0, 1] [{surface} < 0] d(x)\n", "f")
+    assert shown.problems() == []
+    assert shown.text.tangent.startswith(BOTH) and "sign(" not in shown.text.tangent
+    assert root in shown.text.tangent and root.replace("u1", "u2") in shown.text.tangent
+
+
+FUNCTIONS = {  # with their inverses, where these are in the domain
+    "exp(x)": lambda u: mpmath.log(u) if u > 0 else None,
+    "log(x)": mpmath.exp,
+    "sin(x)": lambda u: mpmath.asin(u) if abs(u) <= 1 else None,
+    "x^2": lambda u: mpmath.sqrt(u) if u >= 0 else None,
+    "1/(1 + x)": lambda u: 1 / u - 1 if u else None,
+    "tanh(x)": lambda u: mpmath.atanh(u) if abs(u) < 1 else None,
+    "cos(x)": lambda u: mpmath.acos(u) if abs(u) <= 1 else None,  # which falls
+    "(x - 2)^2": lambda u: 2 - mpmath.sqrt(u) if u >= 0 else None,
+}
+AROUND = [(3, -5, 1.9), (-2, 3.3, -1.25), (1, -1.9, -0.6), (2, 1, -0.7), (1, 0.3, -1.1), (1, 1, 1), (-1, 0.1, 0.3)]
+
+
+@pytest.mark.parametrize("u", FUNCTIONS)
+@pytest.mark.parametrize("place", AROUND)
+def test_the_slope_where_it_is_quadratic_in_a_function(u: str, place: tuple[float, float, float]) -> None:
+    """Held against the length between the roots, to 40 digits; to 1e-10 as above."""
+    surface = f"a*({u})^2 + b*({u}) + c"
+    shown = Shown(f"def f(a, b, c) integral [0, 1] [{surface} < 0] d(x)\n", "f")
+    along, function = (0.3, -0.7, 0.4), eval(f"lambda x: {u.replace('^', '**')}", vars(mpmath))
+
+    def integral(step: mpmath.mpf) -> mpmath.mpf:
+        a, b, c = (mpmath.mpf(p) + step * mpmath.mpf(d) for p, d in zip(place, along, strict=True))
+        root = mpmath.sqrt(b * b - 4 * a * c) if b * b > 4 * a * c else None
+        ends = [] if root is None else [FUNCTIONS[u](r) for r in ((-b - root) / (2 * a), (-b + root) / (2 * a))]
+        cuts = [mpmath.mpf(0), *sorted(x for x in ends if x is not None and 0 < x < 1), mpmath.mpf(1)]
+        middles = [(q - p, function((p + q) / 2)) for p, q in pairwise(cuts)]
+        return sum((length for length, v in middles if a * v * v + b * v + c < 0), mpmath.mpf(0))
+
+    with mpmath.workdps(40):
+        slope = float(mpmath.diff(integral, 0))
+    arguments = ", ".join(map(repr, (*place, *along)))
+    assert shown.module().eval(f"shown_1({arguments})").value == pytest.approx(slope, rel=1e-10, abs=1e-12)
+
+
 def test_names_of_roots_are_no_parameters_and_no_functions() -> None:
     program = "def x2(t) t^2\ndef f(D, x1) integral [0, 1] [D*x^2 + x1*x + x2(x1) < D] d(x)*x2(D)\n"
     shown = Shown(program, "f")

@@ -2,8 +2,8 @@
 
 Owns `is_zero` and `shorter`, which decide whether a determinant vanishes, whether a discriminant cancels, and whether
 an author's inverse is right. Atoms are variables and what is not a polynomial; sin^2 + cos^2 = 1, cosh^2 - sinh^2 = 1,
-sqrt(u)^2 = u and exp(a + b) = exp(a) exp(b) are used. Equal normal forms mean equal values wherever both are defined;
-unequal ones mean nothing.
+sqrt(u)^2 = u, exp(a + b) = exp(a) exp(b) and exp(n log(u)) = u^n are used. Equal normal forms mean equal values
+wherever both are defined; unequal ones mean nothing.
 
 Not `core.normal_form`, which puts terms in order and must keep their values everywhere, so that it has no quotients and
 uses no identity between atoms. What is decided and solved here may be defined at more points than the term was.
@@ -377,12 +377,17 @@ def _square(atom: Term) -> Polynomial | None:
 
 
 def _exponential(node: Prim, inner: Rational) -> Rational:
-    """exp of a sum as a product of powers of exp(monomial)."""
+    """exp of a sum as a product of powers of exp(monomial), and of u for log(u)."""
     if not inner.whole:
         return _atom(node)
     top: dict[Term, int] = {}
     below: dict[Term, int] = {}
+    powers = Rational(ONE, ONE)
     for monomial, coefficient in inner.top.items():
+        match monomial:
+            case ((Prim(op="log", args=(base,)), 1),) if coefficient.denominator == 1:
+                powers = _product(powers, _power(_small(normal(base)), int(coefficient)))
+                continue
         whole = coefficient.denominator == 1 and size_of(coefficient) <= 64
         scale: Exact = 1 if whole else coefficient
         part = as_term({monomial: size_of(scale)})
@@ -391,4 +396,4 @@ def _exponential(node: Prim, inner: Rational) -> Rational:
         side = top if (coefficient > 0) else below
         atom = prim("exp", part)
         side[atom] = side.get(atom, 0) + (int(size_of(coefficient)) if whole else 1)
-    return Rational({sorted_monomial(top): 1}, {sorted_monomial(below): 1})
+    return _product(powers, Rational({sorted_monomial(top): 1}, {sorted_monomial(below): 1}))

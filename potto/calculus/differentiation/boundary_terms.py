@@ -120,7 +120,7 @@ def _at_surface(
             speed = rate(root.at)
             if called is not None:
                 flips = [called.told(flip) for flip in flips]
-                speed = neg(div(substitute(rate(surface), {root.variable: called.at}), called.rise))
+                speed = neg(mul(called.placed(rate(surface)), called.moves))
             gains += _at_root(node, flips, root, speed, called, loops, each, exactly)
         if alike and gains:
             (positive,) = exists
@@ -179,7 +179,7 @@ def _at_root(
     if vanishes(fall) or (exactly and identically_zero(fall)):
         return
     at = root.at if called is None else called.at
-    gain = scaled(fall if called is None else substitute(falling, {root.variable: at}), speed)
+    gain = scaled(fall if called is None else called.placed(falling), speed)
     lo, hi = node.bounds[node.variables.index(root.variable)]
     gain = between(at, lo, hi, gain)
     if root.index is not None and root.counts is not None:
