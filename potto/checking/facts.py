@@ -15,8 +15,7 @@ from potto.calculus.checking.conditions import conditions_of
 from potto.calculus.checking.diffeo import exported
 from potto.calculus.decomposition.guards import unguarded
 from potto.calculus.explanation.bound_names import as_written
-from potto.calculus.explanation.decimals import in_decimals
-from potto.calculus.explanation.explain import describe
+from potto.calculus.explanation.explain import describe, equation
 from potto.calculus.explanation.fields import fields_of
 from potto.calculus.explanation.fractions import as_the_program_writes
 from potto.calculus.explanation.layout import WIDTH, DerivativeText, IntegralText, Show, meets
@@ -24,8 +23,8 @@ from potto.calculus.explanation.symbols import Rewrite
 from potto.calculus.inlining.expand import expanded
 from potto.calculus.surfaces.branch_cuts import opened
 from potto.core.printer import format_term
-from potto.core.simplify import simplify
-from potto.core.terms import App, Branch, Const, Delta, Deriv, Global, Lam, Term, postorder
+from potto.core.simplify import normalized_surface, simplify
+from potto.core.terms import App, Branch, Const, Delta, Deriv, Global, Integral, Lam, Term, postorder
 from potto.elaborate import core, elaborate_expression
 from potto.modules import definition, is_recursive
 from potto.query import Database
@@ -137,9 +136,13 @@ def _surfaces(db: Database, term: Term, fields: Rewrite) -> dict[str, None]:
            for node in postorder(opened(term)) if isinstance(node, Branch | Delta)]  # fmt: skip
     known = [condition.surface for condition in found]
     readable = [surface for surface in own if not any(isinstance(node, App) for node in postorder(surface))]
-    simplified = (simplify(in_decimals(surface)) for surface in (*known, *readable))
-    texts = (format_term(fields(surface)) for surface in simplified if not isinstance(surface, Const))  # it is crossed
-    return dict.fromkeys(f"{_COPY.sub('', text)} = 0" for text in texts)
+    each: dict[Term, Term] = {}
+    for surface in map(simplify, (*known, *readable)):
+        each.setdefault(normalized_surface(surface)[0], surface)
+    crossed = (surface for surface in each.values() if not isinstance(surface, Const))
+    over = {name for node in postorder(term) if isinstance(node, Integral) for name in node.variables}
+    over.update(name for condition in found for name in condition.variables)
+    return dict.fromkeys(_COPY.sub("", equation(fields(surface), over)) for surface in crossed)
 
 
 def derivative_facts(db: Database, file: str, name: str) -> DerivativeFacts | None:

@@ -175,7 +175,7 @@ def _region(node: Integral, params: tuple[str, ...], work: Differentiator, wrt: 
         return work.dual(term, {name: ONE})[1]
 
     def surface(level: Term, jump: Lam | None) -> RegionSurface:
-        where = _COPY.sub("", equation(simplify(level)))
+        where = _COPY.sub("", equation(simplify(level), node.variables))
         slopes = tuple(over(along(level, name)) for name in node.variables)
         return RegionSurface(where, over(level), over(along(level, wrt)), slopes, jump)
 

@@ -1,14 +1,14 @@
 """Core terms as text that reads like Potto.
 
-Owns `format_term`. The text has the parentheses that its meaning needs and no others; a branch between 1 and 0 is an
-Iverson bracket, its surface turned so that it reads as a comparison (`[x < t]` for t - x).
+Owns `format_term` and `format_equation`. The text has the parentheses that its meaning needs and no others; a branch
+between 1 and 0 is an Iverson bracket, its surface turned so that it reads as a comparison (`[x < t]` for t - x).
 """
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 from msgspec import Struct
 
@@ -53,6 +53,8 @@ from potto.core.terms import (
 _OPEN, _OR, _AND, _NOT, _COMPARE, _ADD, _SIGN, _MUL, _POW, _ATOM = range(10)
 _COMPARISONS = {"lt": "<", "le": "<=", "eq": "==", "ne": "!="}
 _LOGIC = {"and": _AND, "or": _OR}
+_NUMBER = re.compile(r"-?[\d.]+(e[-+]?\d+)?")
+_NAME = re.compile(r"[^\W\d][\w.]*")  # or a part of what has one
 _LIKE_A_HEAD = re.compile(r"[^\W\d][\w']*\.\d")  # `c.2`, which begins a function of c where a function's head ends
 
 
@@ -70,30 +72,58 @@ class _Text(Struct, frozen=True):
 _Texts = dict[Term, _Text]
 
 
+_LIMIT = 20_000  # characters of a part that is written
 LONGEST = 120  # characters of a term that a message shows whole
 LEFT_OUT = "..."  # what stands for a part that is too long to be written
 
 
 def abridged(term: Term) -> str:
     """A term that fits a line of a message, by its beginning and its end."""
-    text = format_term(term)
+    return shortened(format_term(term))
+
+
+def shortened(text: str) -> str:
+    """The same of a text."""
     if len(text) <= LONGEST:
         return text
     return f"{text[: LONGEST // 2]} … {text[-LONGEST // 3 :]} ({len(text):,} characters)"
 
 
-def format_term(term: Term, limit: int = 20_000) -> str:
+def format_term(term: Term, limit: int = _LIMIT) -> str:
     """A term as Potto source on one line. Parts longer than `limit` characters are `LEFT_OUT`.
 
     Copies of bound variables, which have names that nobody can write (`k'1`), get names that one can (`k1`).
     """
+    return _texts(term, limit)[term].text
+
+
+def format_equation(surface: Term, variables: Iterable[str] = ()) -> str:
+    """Where a surface is 0, as people write it, whatever its sign: `x = t` for t - x.
+
+    A name that stands alone comes first, of two one of the `variables`; else what is longer, and a number last.
+    """
+    match surface:
+        case Prim(op="neg", args=(inner,)):
+            surface = inner
+        case _:
+            pass
+    less, more, _ = _sides(surface, _texts(surface, _LIMIT))
+
+    def place(side: str) -> tuple[bool, bool, bool, int]:
+        alone = _NAME.fullmatch(side) is not None
+        return _NUMBER.fullmatch(side) is not None, not alone, side not in variables, 0 if alone else -len(side)
+
+    return " = ".join(sorted(sorted((less, more), reverse=True), key=place))
+
+
+def _texts(term: Term, limit: int) -> _Texts:
     texts: _Texts = {}
     nodes = tuple(postorder(term))
     names = _written(nodes)
     for node in nodes:
         text = _node(node if not names else _renamed(node, names), texts)
         texts[node] = text if len(text.text) <= limit else _Text(LEFT_OUT, _ATOM)
-    return texts[term].text
+    return texts
 
 
 @short_text.register(Base)

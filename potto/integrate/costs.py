@@ -139,8 +139,8 @@ class Costs(Struct):
                 )
 
     def told(self, written: Callable[[Term], str]) -> dict[str, Any]:
-        """As a part of an estimate's `stats`; `written`: a surface as the program would write it."""
-        surfaces = [{"surface": f"{written(s)} = 0", "kept": seen.kept, "why": seen.why}
+        """As a part of an estimate's `stats`; `written`: the equation of a surface, in the names of the program."""
+        surfaces = [{"surface": written(s), "kept": seen.kept, "why": seen.why}
                     for s, seen in self.surfaces.items()]  # fmt: skip
         return {
             "interior evaluations": self.interior,

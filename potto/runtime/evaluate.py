@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 
 from potto.calculus.surfaces.discontinuities import TooDeep
-from potto.core.printer import abridged, format_term
+from potto.core.printer import format_equation, shortened
 from potto.core.terms import Data, Fold, Integral, Sum, Term
 from potto.diagnostics import PottoError, Related
 from potto.integrate.events import BOUNDLESS, INFINITE, NO_VALUE, NOT_A_NUMBER, ROUGH, STEEP, Shortfall
@@ -199,7 +199,7 @@ def report(value: Value, machine: Machine, clock: Clock) -> Estimate:
     method = "exact" if not record.methods else "+".join(sorted(record.methods))
     stats = stats_of(record, clock)
     if record.costs is not None:
-        stats |= record.costs.told(lambda surface: abridged(_as_named(surface, machine)))
+        stats |= record.costs.told(lambda surface: shortened(format_equation(_as_named(surface, machine))))
     answer = partial(
         Estimate, evals=record.evaluations, seconds=clock.seconds, compile_seconds=clock.spent,
         plan_seconds=clock.planning, method=method, notes=tuple(_notes(machine)), stats=stats,
@@ -324,7 +324,7 @@ def _notes(machine: Machine) -> list[OneSided]:
     out: list[OneSided] = []
     for edge in machine.record.edges:
         what = edge.cause
-        surface, other = (None if x is None else f"{format_term(_as_named(x, machine))} = 0"
+        surface, other = (None if x is None else format_equation(_as_named(x, machine), (what.variable,))
                           for x in (what.surface, what.other))  # fmt: skip
         backward, forward, before, beyond = map(np.squeeze, edge.sides)
         note = OneSided(

@@ -16,6 +16,7 @@ from how_many import examples
 from potto_repl.respond import respond
 from potto_repl.session import Conversation
 
+import potto
 from potto.calculus.explanation.explain import explain_derivative
 from potto.calculus.explanation.layout import DerivativeText
 from potto.checking.facts import LONG, DerivativeFacts, derivative_facts
@@ -79,6 +80,45 @@ def _by_hover(found: DerivativeText) -> None:
     assert all(packed(text) in shown for text in typeset if len(text) <= LONG_IN_HOVERS)
     assert all(f"{divisor} != 0" in " ".join(found.notes) for divisor in found.divisors)
     assert all(packed(note) in shown for note in found.notes if "!=" in note)
+
+
+SURFACES = [
+    ("[x < t]", "x = t"),
+    ("[x > t]", "x = t"),
+    ("[2*t - 1 > x^2]", "x^2 + 1 = 2*t"),
+    ("[a*x^2 + t*x + 1 < 0]", "a*x^2 + t*x = -1"),
+    ("[t - a*x > 0]*[a*x < t]", "t = a*x"),  # one surface
+    ("[-x > 0]", "x = 0"),
+]
+
+
+@pytest.mark.parametrize(("integrand", "equation"), SURFACES)
+def test_surfaces_are_written_alike(integrand: str, equation: str) -> None:
+    """Without a sign in front, and by the name that stands alone."""
+    text = f"def f(t, a) integral [-1, 1] {integrand} d(x)\n"
+    library, conversation = Library(), Conversation()
+    file = library.put("<text>", text)
+    facts = derivative_facts(library.db, file, "f")
+    assert facts is not None and facts.surfaces == (equation,) and f"surfaces  {equation}" in facts.text
+    function = potto.compile(text).f
+    assert function.surfaces == (equation,)
+    (integral,) = explain_derivative(library.db, file, "f").integrals
+    assert [surface.equation for surface in integral.surfaces] == [equation]
+    respond(conversation, text)
+    (part,) = respond(conversation, ":surfaces f").parts
+    assert part.data is not None and part.data["surfaces"] == [equation]
+    with potto.counting():
+        stats = function(0.3, -2.0).stats
+    assert [surface["surface"] for surface in stats["surfaces"]] == [equation]
+
+
+def test_of_two_names_that_of_the_variable_comes_first() -> None:
+    library = Library()
+    file = library.put("<text>", "def f(set) integral [0, 1] [reading > set] d(reading)\n")
+    facts = derivative_facts(library.db, file, "f")
+    assert facts is not None and facts.surfaces == ("reading = set",)
+    (integral,) = explain_derivative(library.db, file, "f").integrals
+    assert [surface.equation for surface in integral.surfaces] == ["reading = set"]
 
 
 @pytest.mark.parametrize(

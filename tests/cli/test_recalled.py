@@ -137,4 +137,4 @@ def inside(b: Ball)
     for _ in range(2):
         ran = potto(*command, main=main)
         assert ran.out == "(1, 0)\n"
-        assert "the surface b.radius - x = 0 lies on a bound" in ran.err
+        assert "the surface x = b.radius lies on a bound" in ran.err

@@ -63,8 +63,7 @@ def test_where_there_are_two_derivatives_both_are_told(name: str, backward: floa
 def test_the_note_names_both_surfaces() -> None:
     (note,) = rate("times").notes
     assert str(note) == (
-        "the surface t - x = 0 coincides with 2*t - 0.5 - x = 0: the one-sided derivatives differ "
-        "(2 backward, 1 forward)"
+        "the surface x = t coincides with x + 0.5 = 2*t: the one-sided derivatives differ (2 backward, 1 forward)"
     )
 
 

@@ -179,7 +179,7 @@ def test_a_pixel_leads_to_the_conditions_of_the_function_that_it_is_given(server
     place = {"textDocument": {"uri": uri("main")}, "position": {"line": 3, "character": 51}}
     seen = client.answer(client.begin("potto/viewed", place), 60)["result"]
     assert seen["lit"] == "y = 0.25"
-    assert [each["equation"] for each in seen["conditions"]] == ["y = 0.25", "x*(if [y < 0.25] then 1 else 2) = t"]
+    assert [each["equation"] for each in seen["conditions"]] == ["y = 0.25", "t = x*(if [y < 0.25] then 1 else 2)"]
 
 
 def test_a_pixel_leads_to_the_conditions_behind_it(server: Server, uri: Uri) -> None:

@@ -162,7 +162,7 @@ def test_a_delta_is_a_line_without_a_height() -> None:
     """c^2, all of it on the line"""
     shot = looked("on", "c", c=0.5)
     (surface,) = shot.view.surfaces
-    assert (surface.equation, len(surface.lines)) == ("c = x", 1)
+    assert (surface.equation, len(surface.lines)) == ("x = c", 1)
     assert not surface.arrows
     assert shot.numbers.value == pytest.approx(0.25)
     assert shot.numbers.interior == 0

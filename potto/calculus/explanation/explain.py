@@ -37,7 +37,7 @@ from potto.calculus.surfaces.branch_assignment import box_of, branches_of, with_
 from potto.calculus.surfaces.branch_assignment import unguarded as where_it_exists
 from potto.calculus.surfaces.branch_cuts import opened
 from potto.calculus.surfaces.case_split import unnested
-from potto.core.printer import format_term
+from potto.core.printer import format_equation, format_term
 from potto.core.simplify import normalized_surface, simplify
 from potto.core.terms import (
     ONE,
@@ -51,7 +51,6 @@ from potto.core.terms import (
     Sum,
     Term,
     app,
-    branch,
     children,
     integral,
     lam,
@@ -261,7 +260,7 @@ def _integral(
             if _outside(item.surface, box):
                 continue
             if continuous(item, node.variables):
-                meeting.append(equation(words.fields(item.surface)))
+                meeting.append(equation(words.fields(item.surface), node.variables))
             else:
                 deltas.append(words.under_integral(item.contribution, *names, box=box))
         deltas += [words.under_integral(t, *names, box=box) for t in moving_deltas(node, rate)]
@@ -353,7 +352,9 @@ def _surfaces(node: Integral, tangents: Mapping[str, Term], words: Words) -> tup
             except NoClosedForm:
                 pass
             found[canonical] = SurfaceText(
-                equation(words.fields(factor)), tuple(sorted(factor.free & tangents.keys())), tuple(roots)
+                equation(words.fields(factor), node.variables),
+                tuple(sorted(factor.free & tangents.keys())),
+                tuple(roots),
             )
     return tuple(found.values())
 
@@ -383,7 +384,6 @@ def _own_surfaces(body: Term, tangents: Mapping[str, Term]) -> tuple[SurfaceText
 # Text
 
 
-def equation(surface: Term) -> str:
-    """Where a surface is, as people write it: `x = t` for t - x."""
-    where = branch((simplify(in_decimals(surface)),), False, ONE, ZERO)
-    return format_term(where)[1:-1].replace(">=", "=").replace("<=", "=")
+def equation(surface: Term, variables: Iterable[str] = ()) -> str:
+    """Where a surface is, as people write it: `x = t` for t - x, where x is one of the variables."""
+    return format_equation(simplify(in_decimals(surface)), variables)

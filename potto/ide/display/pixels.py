@@ -47,7 +47,7 @@ def pixel_conditions(db: Database, file: str, name: str, given: Functions = ()) 
     shown = {(info.span, info.equation) for info in condition_infos(db, file, name, given) if not info.problem}
     found: dict[PixelCondition, None] = {}
     for condition in conditions(db, file, name, given):
-        span, equation = spans.get(condition.anchor), shown_equation(condition.surface)
+        span, equation = spans.get(condition.anchor), shown_equation(condition.surface, condition.variables)
         surface = _in_the_middle(condition.surface, middles)
         if span is None or (span, equation) not in shown or surface.free - set(params):
             continue

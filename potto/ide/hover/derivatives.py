@@ -132,7 +132,7 @@ def _info(
     moved: tuple[str, ...],
     calls: tuple[str, ...],
 ) -> ConditionInfo:
-    shown, where = _terms(coordinates), shown_equation(coordinates[0])
+    shown, where = _terms(coordinates), shown_equation(coordinates[0], variables)
     if isinstance(verdict, ConditionProblem):
         said = (*verdict.notes, *([verdict.help] if verdict.help else []))
         return ConditionInfo(
@@ -161,9 +161,9 @@ def _info(
     )
 
 
-def shown_equation(surface: Term) -> str:
+def shown_equation(surface: Term, variables: Iterable[str]) -> str:
     """Where a surface is, for a person to read."""
-    return _plain(equation(simplify(surface)))
+    return _plain(equation(simplify(surface), variables))
 
 
 def _term(term: Term) -> str:

@@ -11,7 +11,7 @@ import os.path
 import re
 
 from potto.checking.check import definition_diagnostics
-from potto.core.printer import format_term
+from potto.core.printer import format_equation, format_term
 from potto.core.simplify import simplify
 from potto.core.terms import Branch, Term, var
 from potto.ide.hover.conditions import RULE, at_condition, condition_after
@@ -197,7 +197,7 @@ def _rule(primitive: Primitive) -> str:
 
 
 def _equation(kink: Term) -> str:
-    return f"{format_term(simplify(kink))} = 0"
+    return format_equation(simplify(kink))
 
 
 def measure_markdown(name: str) -> str:
