@@ -1,7 +1,8 @@
 // What a person does with previews.
-import { existsSync, readFileSync, readdirSync, readlinkSync } from "node:fs";
+import { existsSync, readFileSync, readdirSync, readlinkSync, statSync } from "node:fs";
 import { join } from "node:path";
 import assert from "node:assert/strict";
+import { until } from "./waiting.mjs";
 import { EDITOR, frameOf, pixels, preview, settledAfter } from "./window.mjs";
 
 export const PREVIEWS = {
@@ -110,12 +111,12 @@ export const PREVIEWS = {
     const box = page.locator(".quick-input-widget input").first();
     await box.waitFor();
     const target = join(code.workspace, "cover.png");
-    for (let i = 0; i < 50 && !(await box.inputValue()).endsWith("cover.png"); i++) await page.waitForTimeout(100);
+    assert.ok(await until(async () => (await box.inputValue()).endsWith("cover.png")), "no file is proposed");
     await page.keyboard.press("Enter");
-    for (let i = 0; i < 100 && !existsSync(target); i++) await page.waitForTimeout(100);
+    assert.ok(await until(() => existsSync(target) && statSync(target).size > 3000), "no file is written");
     const data = readFileSync(target);
     assert.equal(data.subarray(1, 4).toString(), "PNG");
-    assert.ok(data.length > 3000 && data.readUInt32BE(16) > 200);
+    assert.ok(data.readUInt32BE(16) > 200);
   },
 
   async "a function that a function needs is found, or asked for"({ page, picture, file }) {

@@ -2,6 +2,7 @@
 import { mkdirSync, rmSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
 import assert from "node:assert/strict";
+import { until } from "./waiting.mjs";
 import { EDITOR, preview } from "./window.mjs";
 
 const COMMON = [
@@ -22,15 +23,14 @@ function style(page, line, word) {
 /** What the words look like when they are apart; what they look like in the end if they never are. */
 async function seen(page) {
   let found;
-  for (let i = 0; i < 75; i++) {
-    await page.waitForTimeout(200); // a theme's colours come one after another, those of the server last
+  await until(async () => { // a theme's colours come one after another, those of the server last
     const [x, t] = [await style(page, "x + y < t", "x"), await style(page, "x + y < t", "t")];
     const ground = page.locator(`${EDITOR} .monaco-editor-background`).first();
     const background = await ground.evaluate((element) => getComputedStyle(element).backgroundColor);
     const whole = [x.color, t.color, background].every((colour) => /\d/.test(colour));
     found = { x, t, background, apart: whole && x.color !== t.color && x.fontStyle === "italic" && x.fontWeight > t.fontWeight };
-    if (found.apart) break;
-  }
+    return found.apart;
+  });
   return found;
 }
 
@@ -57,8 +57,7 @@ export const THEMES = {
       const before = await workbench.getAttribute("class");
       const same = theme === COMMON[0]; // the one that is there
       writeFileSync(join(settings, "settings.json"), JSON.stringify({ "workbench.colorTheme": theme }));
-      for (let i = 0; !same && (await workbench.getAttribute("class")) === before && i < 300; i++) await page.waitForTimeout(100);
-      assert.ok(same || (await workbench.getAttribute("class")) !== before, `${theme} was not set`);
+      assert.ok(same || (await until(async () => (await workbench.getAttribute("class")) !== before)), `${theme} was not set`);
       const { x, t, background, apart } = await seen(page);
       if (!apart) wrong.push(`${theme}: ${JSON.stringify(x)} beside ${JSON.stringify(t)}`);
       else if (contrast(x.color, background) < CONTRAST) wrong.push(`${theme}: ${x.color} cannot be read on ${background}`);

@@ -5,6 +5,7 @@ import assert from "node:assert/strict";
 import { PREVIEWS, RENAMED } from "./previews.mjs";
 import { THEMES } from "./themes.mjs";
 import { VIEWS } from "./views.mjs";
+import { until } from "./waiting.mjs";
 import { EDITOR, frameOf, preview, windowOn } from "./window.mjs";
 
 export async function uiTests(code, pictures, report, only) {
@@ -142,8 +143,7 @@ const TESTS = {
     await picture("renamed");
     await command("File: Save All");
     const saved = () => readFileSync(join(code.workspace, "renderer.po"), "utf8").includes("import ball");
-    for (let i = 0; i < 100 && !saved(); i++) await page.waitForTimeout(100);
-    assert.ok(saved());
+    assert.ok(await until(saved), "the other file is not saved");
     await page.locator(`${EDITOR} .squiggly-error`).waitFor({ state: "detached" });
   },
 
@@ -209,7 +209,7 @@ async function walkthrough({ page, picture, command }) {
   await frame.locator("#save").click();
   const box = page.locator(".quick-input-widget input").first();
   await box.waitFor();
-  for (let i = 0; i < 100 && !/\/one\/cover\.png$/.test(await box.inputValue()); i++) await page.waitForTimeout(100);
+  await until(async () => /\/one\/cover\.png$/.test(await box.inputValue()));
   assert.match(await box.inputValue(), /\/one\/cover\.png$/);
   await page.keyboard.press("Escape");
   await page.keyboard.press("Control+1");

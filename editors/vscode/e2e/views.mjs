@@ -1,5 +1,6 @@
 // What a person does with the integral view.
 import assert from "node:assert/strict";
+import { until } from "./waiting.mjs";
 import { EDITOR, frameOf } from "./window.mjs";
 
 const numbers = (frame) => frame.locator("#now .numbers td:nth-child(2)").allInnerTexts();
@@ -93,8 +94,7 @@ export const VIEWS = {
     await go(3, 28);
     await page.locator(`${EDITOR} .view-line`, { hasText: "exp(x) d(x)" }).first().waitFor();
     await page.keyboard.type("2*");
-    for (let wait = 0; wait < 200 && (await picture(frame)) === before; wait++) await page.waitForTimeout(50);
-    assert.notEqual(await picture(frame), before);
+    assert.ok(await until(async () => (await picture(frame)) !== before), "the picture is what it was");
     for (let press = 0; press < 2; press++) await page.keyboard.press("Backspace");
   },
 };

@@ -1,9 +1,9 @@
 // A window as a person uses it: files, commands, places, pictures; and the page of a preview.
 import { dirname, join } from "node:path";
 import { open, remote } from "./vscode.mjs";
+import { PATIENCE, still } from "./waiting.mjs";
 
 export const EDITOR = ".part.editor";
-const PATIENCE = Number(process.env.POTTO_E2E_PATIENCE ?? 60_000); // ms: what a machine that does much else may take
 
 export async function windowOn(code, folder, file, pictures) {
   const first = join(folder.endsWith(".code-workspace") ? dirname(folder) : folder, file);
@@ -15,7 +15,7 @@ export async function windowOn(code, folder, file, pictures) {
     page,
     /** Keep a picture, after what fades in has done so. */
     async picture(name, clip) {
-      await page.waitForTimeout(600);
+      await still(page);
       await page.screenshot({ path: join(pictures, `${name}.png`), ...(clip ? { clip } : {}) });
     },
     /** Open a file by its name. */
