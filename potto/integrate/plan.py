@@ -19,7 +19,7 @@ from potto.calculus.algebra.polytopes import Number
 from potto.calculus.decomposition.surface_cuts import along
 from potto.calculus.differentiation.level_sets import LevelSet, placed_along
 from potto.calculus.inlining.expand import expanded
-from potto.calculus.inlining.unrolled import unrolled
+from potto.calculus.inlining.unrolled import unrolled, written_out
 from potto.calculus.surfaces.discontinuities import findings
 from potto.calculus.surfaces.finding import Decide, Finding, Resolve
 from potto.calculus.surfaces.hoist import hidden, hoisted, split_at_bounds
@@ -62,7 +62,7 @@ class Plan(Struct, frozen=True, dict=True):
 
     decisions: plain terms and the values that they had when the plan was made; it holds where they are the same.
     reaches: whether every jump is known of; if not, boundary terms may be missing.
-    inlined: the integrand with calls carried out, where that can be done.
+    inlined: the integrand with calls carried out and sums that jump written out, where that can be done.
     straight: its terms where it can be integrated by rules that are proved to do, if the parameters let it.
     premise: what has to be positive for the plan to hold: for these parameters some cases are never met.
     confused: whether there are conditions inside of conditions that were not told apart.
@@ -204,7 +204,7 @@ def unpacked_plan(data: bytes, inline: Resolve) -> Plan:
     """The plan that bytes were made of. `inline`: see `make`. Raises ValueError where they were not of a plan."""
     whole, carried_out, own = unpacked(data)
     outline: Outline = unpacked(whole)
-    body = inlined(outline.term, inline) if carried_out else None
+    body = inlined(outline.term, inline, dict(own["decisions"])) if carried_out else None
     return Plan(outline, inlined=body, straight=_straight(outline, body), **own)
 
 
@@ -267,7 +267,7 @@ def make(
     if outline is None:
         outline, reaches, premises, confused = _outlined(term, asked, found, inline, number, over, outlines)
     term = outline.term
-    body = inlined(term, inline) if reaches and not outline.hides else None
+    body = inlined(term, inline, asked.decisions) if reaches and not outline.hides else None
     return Plan(
         outline,
         tuple((t, v) for t, v in asked.decisions.items() if not isinstance(t, Const)),
@@ -324,10 +324,11 @@ def _degrees(body: Term, levels: Sequence[LevelPlan]) -> tuple[int | None, ...]:
     return tuple(found)
 
 
-def inlined(term: Integral, inline: Resolve) -> Term:
-    """The integrand with calls of known functions carried out."""
+def inlined(term: Integral, inline: Resolve, decisions: Mapping[Term, float | None]) -> Term:
+    """The integrand with calls of known functions carried out, and sums that jump written out as far as these
+    decisions tell their summands."""
     passed = {name: f for name in sorted(term.body.free) if (f := inline(var(name))) is not None}
-    return expanded(substitute(term.body, passed), inline)
+    return written_out(expanded(substitute(term.body, passed), inline), decisions)
 
 
 def _inner_integrals(term: Integral) -> Iterable[Integral]:

@@ -379,3 +379,20 @@ def test_a_union_is_planned_in_as_many_steps_as_it_has_regions() -> None:
         f = potto.compile(f"def f(t) integral [0, 1] exp(x)*[{inside}] d(x)").f
         costs.append(calls_in(lambda f=f: f(0.9)))  # type: ignore[misc]
     assert all(large <= STEP * small for small, large in itertools.pairwise(costs)), costs
+
+
+@pytest.mark.parametrize("condition", ["x < {k}*t/{m}", "x^2 < {k}*t/{m}"])
+def test_a_sum_costs_what_it_costs_written_out(condition: str) -> None:
+    """Functions that are called at parameters that are new, and the value against its closed form."""
+    n, root, t = 30, 2 if "^" in condition else 1, Number(0.9)
+    term, costs = condition.format(k="k", m=n + 1), list[int]()
+    with mpmath.workdps(DIGITS):
+        cuts = [mpmath.root(k * t / (n + 1), root) for k in range(1, n + 1)]
+        value, slopes = truth(lambda x, sides: x / (1 + sum(sides)), cuts)
+        by_t = mpmath.fsum(s * a / (root * t) for s, a in zip(slopes, cuts, strict=True))
+    for each in (f"sum k in 1..{n} ([{term}])", " + ".join(f"[{term.replace('k', str(k))}]" for k in range(1, n + 1))):
+        f = potto.compile(f"def f(t) integral [0, 1] 1/(1 + {each}) d(x)").f
+        checked(potto.grad(f, "t")(0.9), value, [by_t])
+        f(0.95)
+        costs.append(calls_in(lambda f=f: f(0.85)))  # type: ignore[misc]
+    assert costs[0] == costs[1]

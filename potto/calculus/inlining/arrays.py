@@ -14,6 +14,7 @@ from potto.calculus.differentiation.dual import Differentiator
 from potto.calculus.inlining.choices import at_place, calls_of_items
 from potto.calculus.inlining.expand import Resolve, expanded
 from potto.calculus.inlining.lattices import looks_up
+from potto.calculus.inlining.unrolled import MOST_STEPS
 from potto.core.binders import apart
 from potto.core.terms import (
     ZERO,
@@ -59,8 +60,6 @@ from potto.core.terms import (
 
 ARRAYS: tuple[type[Term], ...] = (Array, Index, Length, ListOf, Fold, Data)
 READS = (Index, Length, Proj)
-MOST_STEPS = 1000  # of a loop that is written out
-
 
 Loop = tuple[str, Term, Term]  # the index of a sum, from, to
 Summand = tuple[tuple[Loop, ...], Term]

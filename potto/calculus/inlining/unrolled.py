@@ -1,12 +1,13 @@
 """Terms with everything carried out that plain values decide: calls, the sides of plain conditionals, sums.
 
-Owns `unrolled`. `expand` leaves a recursion as a call, since how deep it goes is a matter of values; here the values
-are known, so that a simulation of n steps becomes one term, in which a state that is met again is one object.
+Owns `unrolled` and `written_out`. `expand` leaves a recursion as a call, since how deep it goes is a matter of values;
+here the values are known, so that a simulation of n steps becomes one term, in which a state that is met again is one
+object.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from potto.calculus.inlining.expand import Calls
 from potto.calculus.surfaces.finding import Decide, Resolve
@@ -15,9 +16,11 @@ from potto.core.binders import apart
 from potto.core.terms import (
     App,
     Branch,
+    Const,
     Delta,
     Deriv,
     Fold,
+    Holding,
     If,
     Lam,
     Proj,
@@ -34,30 +37,46 @@ from potto.core.terms import (
 
 DEEPEST = 150  # calls inside calls: Python's own stack holds four frames for each
 MOST_CALLS = 5000
-MOST_SUMMANDS = 256
+MOST_SUMMANDS = 256  # where it is not known yet what becomes of them
+MOST_STEPS = 1000  # of a loop that is written out to be integrated
+
+holds_loop, holds_branch = Holding(Sum, Fold), Holding(Branch)
 
 
 class _TooMuch(Exception):
     """More calls than a term is worth."""
 
 
-def unrolled(term: Term, resolve: Resolve, decide: Decide) -> Term | None:
+def unrolled(term: Term, resolve: Resolve, decide: Decide, most: int = MOST_SUMMANDS) -> Term | None:
     """An equal term for the plain values at hand; None if it would take too many calls.
 
-    `resolve` gives the functions that a call may be replaced by; others stay calls.
+    `resolve` gives the functions that a call may be replaced by; others stay calls. most: steps of a loop.
     """
     try:
-        return apart(_Unrolling(resolve, decide).run(term, 0))
+        return apart(_Unrolling(resolve, decide, most).run(term, 0))
     except _TooMuch:
         return None
+
+
+def written_out(term: Term, decisions: Mapping[Term, float | None]) -> Term:
+    """An equal term in which sums and folds that jump are written out, calls left as they are. decisions: the values
+    of plain terms, as far as these are known."""
+    if not (holds_loop(term) and holds_branch(term)):
+        return term
+
+    def decided(plain: Term) -> float | None:
+        return plain.value if isinstance(plain, Const) else decisions.get(plain)
+
+    return unrolled(term, lambda head: None, decided, MOST_STEPS) or term
 
 
 class _Unrolling:
     """One unrolling."""
 
-    def __init__(self, resolve: Resolve, decide: Decide) -> None:
+    def __init__(self, resolve: Resolve, decide: Decide, most: int) -> None:
         self.resolve = resolve
         self.decide = decide
+        self.most = most
         self.calls = Calls()
 
     def run(self, term: Term, depth: int) -> Term:
@@ -134,6 +153,6 @@ class _Unrolling:
     def numbers(self, node: Sum | Fold) -> range | None:
         """What a loop goes through, if that is known and not too much to write out."""
         lo, hi = self.decide(node.lo), self.decide(node.hi)
-        if lo is None or hi is None or not hi - lo < MOST_SUMMANDS:
+        if lo is None or hi is None or not hi - lo < self.most:
             return None
         return range(int(lo), int(hi) + 1)

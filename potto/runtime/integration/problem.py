@@ -259,7 +259,7 @@ class Problem:
             return None
         if not known.written:
             with making:
-                known.written.append(inlined(self.term, self.plain_function))
+                known.written.append(inlined(self.term, self.plain_function, {}))
         return known.written[0]
 
     def steps(self) -> Eliminated | None:

@@ -12,9 +12,10 @@ import numpy as np
 from msgspec.structs import replace
 
 from potto.calculus.differentiation.derivative import NotSmooth
-from potto.calculus.inlining.arrays import MOST_STEPS, TooMany, each_integral, inlined, loops, summands, unrolled
+from potto.calculus.inlining.arrays import TooMany, each_integral, inlined, loops, summands, unrolled
 from potto.calculus.inlining.lattices import by_cells
 from potto.calculus.inlining.reads import Access, hoisted
+from potto.calculus.inlining.unrolled import MOST_STEPS
 from potto.calculus.solving.pivots import NoClosedForm
 from potto.core.terms import (
     Branch,
