@@ -39,7 +39,7 @@ MOST_VARIABLES, MOST_CUTS, MOST_TERMS = 3, 13, 600
 # Up to how many cuts cells are looked at one by one (`proved_sums`): with four a call at the same numbers takes 85 us
 # so and 137 by step functions, with twelve 160 and 155; where numbers change 1.1 ms and 0.14, and 5 and 0.16.
 FEW_CUTS = 4
-MOST_CHOICES = 4  # each of which may double the number of plans
+MOST_CHOICES = 4  # each of which may double the number of plans, where step functions do not do without
 # Enough for the number of a row in a frame: two bounds, then cuts.
 ROW_BITS = (MOST_CUTS + 1).bit_length()
 RowNumbers = NDArray[np.integer[Any]]  # numbers of rows of frames
@@ -115,7 +115,7 @@ def straight(term: Integral, body: Term, levels: Sequence[LevelPlan]) -> Straigh
     cuts = [cut for level in levels for cut in children(level.frame.body)]
     choices = choices_of(cuts, {*postorder(term), *nodes}, term.variables)
     analytic = all(map(enclosable, surfaces)) and smooth(cuts, choices) and _enclosable_sides(body)
-    if len(choices) > MOST_CHOICES or not analytic:
+    if not analytic or (steps is None and len(choices) > MOST_CHOICES):
         return None
     places, frames = zip(*(_distinct(level.frame) for level in levels), strict=True)
     free = body.free.union(*(frame.body.free for frame in frames)) - set(term.variables)

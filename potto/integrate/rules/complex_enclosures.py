@@ -109,7 +109,7 @@ def known_to_discs(node: Term) -> bool:
         case Const() | Var():
             return True
         case Prim(op="pow"):
-            return isinstance(node.args[1], Const)
+            return not node.args[1].free
         case Prim():
             return DISCS.knows(node.op)
     return False

@@ -16,12 +16,13 @@ from collections.abc import Sequence
 import numpy as np
 from msgspec.structs import replace
 
+from potto.core.terms import children
 from potto.integrate.fixed.cells.product_rule import CALL, CANCELS, FEW, ProductRule, added_together, way_of
 from potto.integrate.fixed.cells.proved_shapes import proved_rules
 from potto.integrate.fixed.cells.topologies import Alike, topologies
 from potto.integrate.fixed.moving_sums import evaluated
 from potto.integrate.fixed.steps.step_batches import by_cells
-from potto.integrate.fixed.straight import StraightIntegral, in_rows
+from potto.integrate.fixed.straight import MOST_CHOICES, StraightIntegral, in_rows
 from potto.integrate.pieces import Evaluator, Shaped, Sums, added_up, gather, together
 from potto.kernels.cells import Array, Bools, Cell, Ints, Value
 
@@ -60,6 +61,8 @@ def by_shapes(
         )  # fmt: skip
     if plan.choices is None:
         return _of_one_form(plan, degrees, machine, env, batch, tight)
+    if len(children(plan.choices.body)) > MOST_CHOICES:
+        return None
     (done, short), sums = np.zeros((2, batch), dtype=bool), Sums.zeros(1, machine.directions, batch)
     names = plan.choices.params
     met = np.array([np.broadcast_to(cell.v, batch) for cell in

@@ -28,7 +28,7 @@ from potto.integrate.fixed.regions import LOOSEST, Path, Places, known, region_o
 from potto.integrate.fixed.steps.step_cells import step_cells
 from potto.integrate.fixed.steps.step_gradients import step_gradient
 from potto.integrate.fixed.steps.step_sums import SteppedCall
-from potto.integrate.fixed.straight import CLEAR, StraightIntegral, nothing
+from potto.integrate.fixed.straight import CLEAR, MOST_CHOICES, StraightIntegral, nothing
 from potto.integrate.pieces import Evaluator, Sums
 from potto.integrate.rules.proved_orders import FrameCell as Stretch
 from potto.integrate.rules.proved_orders import Region
@@ -254,8 +254,7 @@ def proved_gradient(
 
 
 def _summed(plan: StraightIntegral, machine: Evaluator, env: dict[str, Value]) -> MovingTotals | None:
-    plan, values = _decided(plan, machine, env)
-    if values is None or machine.frozen or machine.side:
+    if _numbers(plan, env) is None or machine.frozen or machine.side:
         return None
     certain = machine.costs is None and _exact(plan, env)
     if certain and plan.steps is not None:
@@ -264,6 +263,9 @@ def _summed(plan: StraightIntegral, machine: Evaluator, env: dict[str, Value]) -
             return stepped
         if step_cells(plan.steps, machine.tracking(), env).fine:
             return None  # one cell after the other would take the square of that, and leave as much
+    plan, values = _decided(plan, machine, env)
+    if values is None:
+        return None
     frame = evaluated(plan.frames[0], machine.tracking(), env)
     reach, rtol = float(frame[1].v - frame[0].v), min(machine.rtol, LOOSEST)
     region = found.region if certain and (found := known(plan, values, reach, rtol)) else None
@@ -289,13 +291,15 @@ def _summed(plan: StraightIntegral, machine: Evaluator, env: dict[str, Value]) -
 @np.errstate(all="ignore")
 def settled(plan: StraightIntegral, machine: Evaluator, env: dict[str, Value]) -> SettledRegion | SteppedCall | None:
     """What is known of the integral for all parameters near these; None where that is not settled, or not yet."""
-    plan, values = _decided(plan, machine, env)
-    if values is None or machine.frozen or machine.side or machine.costs is not None:
+    if _numbers(plan, env) is None or machine.frozen or machine.side or machine.costs is not None:
         return None
     if not _exact(plan, env):
         return None
     if plan.steps is not None:
         return SteppedCall(plan.steps, machine.tracking())
+    plan, values = _decided(plan, machine, env)
+    if values is None:
+        return None
     low, high, *_ = evaluated(plan.frames[0], machine.tracking(), env)
     found = known(plan, values, float(high.v - low.v), min(machine.rtol, LOOSEST))
     if found is None:
@@ -313,9 +317,12 @@ def settled(plan: StraightIntegral, machine: Evaluator, env: dict[str, Value]) -
 def _decided(
     plan: StraightIntegral, machine: Evaluator, env: dict[str, Value]
 ) -> tuple[StraightIntegral, dict[str, float] | None]:
-    """The plan as these parameters decide its choices, and the parameters, if each is one finite number."""
+    """The plan as these parameters decide its choices, and the parameters, if each is one finite number; None, too,
+    where there are more choices than plans are made for."""
     values = _numbers(plan, env)
     if values is not None and plan.choices is not None:
+        if len(children(plan.choices.body)) > MOST_CHOICES:
+            return plan, None
         met = [float(cell.v) for cell in evaluated(plan.choices, machine, env)]
         if not all(x in (0.0, 1.0) for x in met):
             return plan, None

@@ -18,7 +18,7 @@ from msgspec import Struct
 from potto.core.terms import Const, children
 from potto.integrate.fixed.moving_sums import any_moves, evaluated
 from potto.integrate.fixed.steps.step_integral import StepIntegral
-from potto.integrate.fixed.steps.step_sides import Passed, Sides, layout, sides_of, taken
+from potto.integrate.fixed.steps.step_sides import Passed, Sides, layout, same_leads, sides_of, taken
 from potto.integrate.fixed.straight import CLEAR
 from potto.integrate.pieces import Evaluator
 from potto.integrate.rules.gauss import EPS
@@ -29,6 +29,24 @@ WIDE = np.longdouble
 WIDE_EPS = float(np.finfo(WIDE).eps)
 WHOLE = 2.0**53  # below which sums of whole numbers are exact
 Height = tuple[Array, Array | None]
+
+
+class Arrangement(Struct, frozen=True):
+    """What follows from the order of the rows of a frame, and from signs that are asked for, of one member or of B.
+
+    rows: from bound to bound ([B,] C + 1), so many of which count. passed, sides, taken: as of `StepCells`. resting:
+    the heights of step functions that are made of numbers, None for others. order, absent: of one member all rows that
+    there are, those beyond the bounds too, and roots that are not there.
+    """
+
+    rows: Ints
+    count: Ints
+    passed: Passed
+    sides: Sides
+    taken: tuple[tuple[Ints, ...], ...]
+    resting: tuple[Height | None, ...]
+    order: Ints
+    absent: Ints
 
 
 class StepCells(Struct, frozen=True):
@@ -84,23 +102,55 @@ def cells_between(
     """The cells between the rows of a frame, with tangents in k directions. heights: as of `levels_of`. shape: of the
     batch."""
     places, errors = _rows(frame, k, shape)
-    sides = sides_of(plan, places[0], machine, env)
-    _absent(places[0], errors[0])
-    rows, count = _in_order(places[0], errors[0])
+    found = None if shape else _still_so(plan, places[0], errors[0], machine, env)
+    if found is None:
+        found = _arranged(plan, places[0], errors[0], machine, env)
+    rows = found.rows
     ends, slack = _along(places, rows), _along(errors, rows)
     width, doubt = ends[..., 1:] - ends[..., :-1], slack[..., 1:] + slack[..., :-1]
-    passed = _passed(rows, count, plan.rows)
-    chosen = tuple([tuple([taken(plan, choice, sides, passed) for choice in step.choices]) for step in plan.steps])
-    along = tuple([
-        _height(plan, own, *(_numbers(plan, own) or _rows(levels, k, shape)), sides, passed, chosen[own])
-        for own, levels in enumerate(heights)
-    ])  # fmt: skip
-    moving = tuple([any_moves(frame, d) for d in range(k)])
+    fine = _apart(width[0], doubt[0], found.count) & found.sides.sure
+    if not shape and fine and not found.sides.between:
+        plan.arrangements[0] = found
+    along = tuple([found.resting[own] or _height(plan, own, *_rows(levels, k, shape), found.sides, found.passed,
+                                                 found.taken[own]) for own, levels in enumerate(heights)])  # fmt: skip
     return StepCells(
         ends[..., :-1], width, doubt + EPS * (np.abs(ends[..., 1:]) + np.abs(ends[..., :-1])), along,
-        moving, _apart(width[0], doubt[0], count) & sides.sure, count - 1, rows[..., :-1], rows[..., 1:],
-        passed, sides, chosen,
+        tuple([any_moves(frame, d) for d in range(k)]), fine, found.count - 1, rows[..., :-1], rows[..., 1:],
+        found.passed, found.sides, found.taken,
     )  # fmt: skip
+
+
+def _still_so(
+    plan: StepIntegral, places: Array, errors: Array, machine: Evaluator, env: Mapping[str, Value]
+) -> Arrangement | None:
+    """The arrangement that one member had last, if it is that of another one, too: as many comparisons as cuts."""
+    found: Arrangement | None = plan.arrangements.get(0)
+    if found is None:
+        return None
+    at, off = places[found.order], CLEAR * errors[found.order]
+    if not (at[1:] - at[:-1] > off[1:] + off[:-1]).all():
+        return None
+    if found.absent.size and not np.isnan(places[found.absent]).all():
+        return None
+    return found if not layout(plan).leads.size or same_leads(plan, found.sides, machine, env) else None
+
+
+def _arranged(
+    plan: StepIntegral, places: Array, errors: Array, machine: Evaluator, env: Mapping[str, Value]
+) -> Arrangement:
+    """The arrangement of places and errors ([B,] R)."""
+    sides = sides_of(plan, places, machine, env)
+    _absent(places, errors)
+    rows, count = _in_order(places, errors)
+    passed = _passed(rows, count, plan.rows)
+    chosen = tuple([tuple([taken(plan, choice, sides, passed) for choice in step.choices]) for step in plan.steps])
+    numbers = [_numbers(plan, own) for own in range(len(plan.steps))]
+    resting = tuple([
+        None if known is None else _height(plan, own, *known, sides, passed, chosen[own])
+        for own, known in enumerate(numbers)
+    ])  # fmt: skip
+    order, there = places.argsort(axis=-1), int((~np.isnan(places)).sum())
+    return Arrangement(rows, count, passed, sides, chosen, resting, order[..., :there], order[..., there:])
 
 
 def levels_of(plan: StepIntegral, machine: Evaluator, env: Mapping[str, Value]) -> list[tuple[Cell, ...]]:
@@ -171,8 +221,8 @@ def _absent(places: Array, errors: Array) -> None:
 
 
 def _in_order(places: Array, errors: Array) -> tuple[Ints, Ints]:
-    """The rows from one bound to the other in order, ([B,] R), the upper bound again and again where cuts lie beyond
-    these; how many there are, ([B])."""
+    """The rows from one bound to the other in order, and how many there are: of one member these, of several ([B,] R),
+    the upper bound again and again where cuts lie beyond these."""
     near = CLEAR * errors
     away = np.isnan(places)
     away |= places < places[..., :1] - near[..., :1] - near
@@ -181,6 +231,8 @@ def _in_order(places: Array, errors: Array) -> tuple[Ints, Ints]:
     key[..., 0], key[..., 1] = -np.inf, np.finfo(float).max  # what lies next to a bound counts as within
     order, beyond = key.argsort(axis=-1), away[..., 2:].sum(axis=-1)
     count = order.shape[-1] - beyond
+    if order.ndim == 1:
+        return order[: int(count)], count
     if beyond.any():
         order = np.where(np.arange(order.shape[-1]) < count[..., None], order, 1)
     return order, count
@@ -204,7 +256,7 @@ def _passed(rows: Ints, count: Ints, number: int) -> Passed:
     cells = rows.shape[-1] - 1
     place = np.full((*rows.shape[:-1], number + 1), cells)
     if rows.ndim == 1:
-        place[rows[1 : int(count) - 1]] = np.arange(1, int(count) - 1)
+        place[rows[1:-1]] = np.arange(1, cells)
     else:
         at = np.broadcast_to(np.arange(1, cells), (len(rows), cells - 1))
         cut = at < count[:, None] - 1

@@ -47,7 +47,8 @@ def step_gradient(
     cells = cells_between(plan, frame, levels, machine, still, 0)
     if not cells.fine:
         return None
-    cells = lit(cells, plan) if all(plan.resting) else cells.pick((slice(int(cells.inside)),))
+    if all(plan.resting):
+        cells = lit(cells, plan)
     order, proof = 1, None
     if plan.degree is not None:
         order = plan.degree // 2 + 1

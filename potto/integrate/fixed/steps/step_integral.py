@@ -16,8 +16,10 @@ from msgspec import Struct
 
 from potto.calculus.algebra.affine import affine
 from potto.calculus.algebra.degree import degree
+from potto.calculus.algebra.ranges import range_of
 from potto.calculus.decomposition.conic_regions import polynomial
 from potto.calculus.decomposition.surface_cuts import WrittenSurface, all_sections, face_of
+from potto.calculus.differentiation.derivative import NotSmooth, partial
 from potto.calculus.surfaces.domains import ends_of_domain
 from potto.core.terms import (
     INF,
@@ -31,6 +33,7 @@ from potto.core.terms import (
     Term,
     add,
     children,
+    const,
     div,
     function_of,
     mul,
@@ -45,19 +48,22 @@ from potto.core.terms import (
 from potto.integrate.fixed.root_choices import choices_of, smooth
 from potto.integrate.fixed.steps.step_choices import Choice, choice_of
 from potto.integrate.rules.complex_enclosures import enclosable
+from potto.primitives import PRIMITIVES
 
 MOST_TERMS = 600  # of what is left where step functions have names
 BOUNDS = 2  # rows of a frame that come before its cuts
 
 
 class StepSurface(Struct, frozen=True):
-    """What a condition compares with 0. rows: of the frame, where it may change its sign. lead: of a polynomial with as
-    many roots as there are rows the coefficient of the highest power; None of others, which are asked between their
-    rows which sign they have."""
+    """What a condition compares with 0. rows: of the frame, where it may change its sign. lead: what has the sign that
+    it has above its last row, if it has another one below each: of a polynomial with as many roots as there are rows
+    the coefficient of the highest power, and 1 or -1 of what rises or falls; None of others, which are asked between
+    their rows which sign they have. told: whether that is so, too, where roots are not there, as in pairs."""
 
     form: Term
     rows: tuple[int, ...]
     lead: Term | None
+    told: bool
 
 
 class StepFunction(Struct, frozen=True, eq=False):
@@ -78,10 +84,11 @@ class StepIntegral(Struct, frozen=True, eq=False):
 
     frame: both bounds, then the cuts, each once. body: the integrand, with `names` for the step functions. dark:
     whether it is 0 where all of these are. degree: of the body in the variable, None where it is not a polynomial.
-    surfaces: of all conditions. asked: what tells their sides: leading coefficients that are no numbers, then other
-    surfaces, each at as many places as stretches lie between its rows, under the names of `probe`. heights: of one step
+    surfaces: of all conditions. asked: what tells their sides where all roots are there, and where some are not:
+    leading coefficients that are no numbers, then other surfaces, each at as many places as stretches lie between its
+    rows, under the names of `probe`. heights: of one step
     function after the other what it is made of, as `StepFunction` says. resting: which have nothing but numbers there.
-    proofs: what was proved last (`step_orders`), by the accuracy.
+    proofs: what was proved last (`step_orders`), by the accuracy. arrangements: how cuts lay last (`step_cells`).
     """
 
     variable: str
@@ -91,11 +98,12 @@ class StepIntegral(Struct, frozen=True, eq=False):
     dark: bool
     degree: int | None
     surfaces: tuple[StepSurface, ...]
-    asked: Lam
+    asked: tuple[Lam, Lam]
     steps: tuple[StepFunction, ...]
     heights: Lam
     resting: tuple[bool, ...]
     proofs: dict[float, Any] = {}
+    arrangements: dict[int, Any] = {}
 
     @property
     def rows(self) -> int:
@@ -105,6 +113,11 @@ class StepIntegral(Struct, frozen=True, eq=False):
 def probe(surface: int, stretch: int) -> str:
     """The name of the place at which a surface is asked in a stretch between its rows."""
     return f"#at{surface}'{stretch}"
+
+
+def asked_between(surface: StepSurface, there: bool) -> bool:
+    """Whether a surface is asked between its rows which sign it has. there: all roots are."""
+    return surface.lead is None or not (there or surface.told)
 
 
 def step_integral(term: Integral, body: Term) -> StepIntegral | None:
@@ -131,7 +144,7 @@ def step_integral(term: Integral, body: Term) -> StepIntegral | None:
     resting = tuple([all(isinstance(height, Const) for height in own) for own in heights])
     return StepIntegral(
         term.variables[0], function_of(tuple_(frame)), function_of(whole), names, dark, degree(whole, term.variables),
-        tuple(reading.surfaces), function_of(tuple_(reading.asked())), steps, function_of(levels), resting,
+        tuple(reading.surfaces), (reading.asked(True), reading.asked(False)), steps, function_of(levels), resting,
     )  # fmt: skip
 
 
@@ -190,20 +203,21 @@ class _Reading:
     def _found(self, face: WrittenSurface) -> StepSurface | None:
         """A surface with its rows; None where these are no closed forms."""
         found = _solved(face, self.variable)
-        return None if found is None else StepSurface(face.form, self._placed(found[0]), found[1])
+        return None if found is None else StepSurface(face.form, self._placed(found[0]), *found[1:])
 
     def _placed(self, roots: Sequence[Term]) -> tuple[int, ...]:
         return tuple(dict.fromkeys(self.rows.setdefault(root, len(self.rows)) for root in roots))
 
-    def asked(self) -> list[Term]:
-        """What tells the sides of the surfaces."""
+    def asked(self, there: bool) -> Lam:
+        """What tells the sides of the surfaces, where all roots are there or not."""
         leads = [s.lead for s in self.surfaces if s.lead is not None and not isinstance(s.lead, Const)]
-        return leads + [
+        between = [
             substitute(surface.form, {self.variable: var(probe(number, stretch))})
             for number, surface in enumerate(self.surfaces)
-            if surface.lead is None
+            if asked_between(surface, there)
             for stretch in range(1 + len(surface.rows))
         ]
+        return function_of(tuple_((*leads, *between)))
 
     def put_together(self, body: Term) -> Term:
         """The integrand with names in place of step functions, as few as there may be."""
@@ -233,13 +247,13 @@ class _Reading:
 
 # What follows from a surface or a step function alone is found once: one shader takes another's place.
 @lru_cache(maxsize=4096)
-def _solved(face: WrittenSurface, variable: str) -> tuple[tuple[Term, ...], Term | None] | None:
-    """The places at which a surface may change its sign, and what leads if it is a polynomial with no other roots; None
-    where they are no closed forms."""
+def _solved(face: WrittenSurface, variable: str) -> tuple[tuple[Term, ...], Term | None, bool] | None:
+    """The rows, `lead` and `told` of a surface; None where the places at which it may change its sign are no closed
+    forms."""
     line = affine(face.form, (variable,))
     slope = line.coefficients[0] if line is not None else ZERO
     if line is not None and isinstance(slope, Const) and slope.value != 0:
-        return (_root(line.rest, slope),), slope
+        return (_root(line.rest, slope),), slope, True
     if variable not in face.form.free or not enclosable(face.form):
         return None
     ends = (end for end in ends_of_domain(face.form) if variable in end.free)
@@ -250,8 +264,30 @@ def _solved(face: WrittenSurface, variable: str) -> tuple[tuple[Term, ...], Term
             return None
         roots |= dict.fromkeys((*found.roots, *found.poles))
     powers = polynomial(face.form, variable)
-    told = powers is not None and len(powers) == 1 + len(roots) and enclosable(powers[0])
-    return tuple(roots), powers[0] if powers and told else None
+    if powers and len(powers) == 1 + len(roots) and enclosable(powers[0]):
+        return tuple(roots), powers[0], True
+    return tuple(roots), _direction(face.form, variable) if len(roots) == 1 else None, False
+
+
+def _direction(form: Term, variable: str) -> Const | None:
+    """Whether a term rises or falls in the variable all over, as 1 or -1; None where its form shows neither, or may
+    have no value or a pole somewhere. Where a slope depends on nothing else, it is 0 at single places at the most."""
+    edges = (e for node in postorder(form) if isinstance(node, Prim) for e in PRIMITIVES[node.op].edges(*node.args))
+    if any(variable in edge.free and not _of_one_sign(edge) for edge in edges):
+        return None
+    try:
+        slope = partial(form, variable)
+    except NotSmooth:
+        return None
+    found, alone = range_of(slope), slope.free == {variable}
+    if found.positive or (alone and found.lo >= 0):
+        return ONE
+    return const(-1.0) if found.negative or (alone and found.hi <= 0) else None
+
+
+def _of_one_sign(term: Term) -> bool:
+    found = range_of(term)
+    return found.positive or found.negative
 
 
 @lru_cache(maxsize=256)

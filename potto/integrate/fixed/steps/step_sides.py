@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from potto.core.terms import Const, children
 from potto.integrate.fixed.moving_sums import evaluated
 from potto.integrate.fixed.steps.step_choices import Choice, Heads
-from potto.integrate.fixed.steps.step_integral import StepIntegral, probe
+from potto.integrate.fixed.steps.step_integral import StepIntegral, asked_between, probe
 from potto.integrate.fixed.straight import CLEAR
 from potto.integrate.pieces import Evaluator
 from potto.kernels.cells import Array, Bools, Cell, Ints, Value
@@ -46,11 +46,14 @@ class Passed(Struct, frozen=True):
 
 class Sides(Struct, frozen=True):
     """first: ([B,] S), whether the first cell is above each surface. change: ([B,] S, M), 1 or -1 where the sign of
-    one changes at its rows, else 0. sure: for whom all that is known."""
+    one changes at its rows, else 0. sure: for whom all that is known. leads: ([B,] T), whether leading coefficients
+    that were asked for are above 0. between: whether surfaces were asked between their rows."""
 
     first: Bools
     change: Ints
     sure: Bools
+    leads: Bools
+    between: bool
 
 
 class _Layout(Struct, frozen=True):
@@ -59,7 +62,7 @@ class _Layout(Struct, frozen=True):
     rows: (S, M), of the surfaces, filled up with a row that is none. roots: polynomials by their degrees, with the
     signs of their leading coefficients, (N,) each. leads: those whose signs are asked for. others: the surfaces that
     are asked, by how many rows they have, with the numbers of their places, (N, m + 1), among all, which have the names
-    `probes`.
+    `probes`. untold: the rows of what leads only where these are there.
     """
 
     rows: Ints
@@ -68,10 +71,12 @@ class _Layout(Struct, frozen=True):
     leads: Ints
     others: tuple[tuple[Ints, Ints], ...]
     probes: tuple[str, ...]
+    untold: Ints
 
 
 @lru_cache(maxsize=512)
-def layout(plan: StepIntegral) -> _Layout:
+def layout(plan: StepIntegral, there: bool = True) -> _Layout:
+    """there: all roots are, of what is not told without."""
     most = max(len(surface.rows) for surface in plan.surfaces)
     rows = np.array([[*s.rows, *[plan.rows] * (most - len(s.rows))] for s in plan.surfaces])
     signs = [int(np.sign(s.lead.value)) if isinstance(s.lead, Const) else 0 for s in plan.surfaces]
@@ -80,7 +85,7 @@ def layout(plan: StepIntegral) -> _Layout:
     others: dict[int, list[tuple[int, range]]] = {}
     probes: list[str] = []
     for n, s in enumerate(plan.surfaces):
-        if s.lead is not None:
+        if not asked_between(s, there):
             roots.setdefault(len(s.rows), []).append(n)
             continue
         names = [probe(n, i) for i in range(1 + len(s.rows))]
@@ -88,19 +93,23 @@ def layout(plan: StepIntegral) -> _Layout:
         probes += names
     groups = tuple((np.array([n for n, _ in own]), np.array([at for _, at in own])) for own in others.values())
     by_degree = tuple((degree, np.array(own)) for degree, own in roots.items())
-    return _Layout(rows, by_degree, np.array(signs), np.array(leads, dtype=int), groups, tuple(probes))
+    untold = np.array([row for s in plan.surfaces if s.lead is not None and not s.told for row in s.rows], dtype=int)
+    return _Layout(rows, by_degree, np.array(signs), np.array(leads, dtype=int), groups, tuple(probes), untold)
 
 
 def sides_of(plan: StepIntegral, places: Array, machine: Evaluator, env: Mapping[str, Value]) -> Sides:
     """places: ([B,] R), of the rows of the frame, nan for a root that is not there."""
-    at, shape = layout(plan), places.shape[:-1]
+    untold, shape = layout(plan).untold, places.shape[:-1]
+    there = not (untold.size and np.isnan(places[..., untold]).any())
+    at = layout(plan, there)
     first = np.zeros((*shape, len(plan.surfaces)), dtype=bool)
     change = np.zeros((*shape, *at.rows.shape), dtype=np.int8)
     sure = np.ones(shape, dtype=bool)
     stretches = [_stretches(places, at.rows[own, : numbers.shape[1] - 1]) for own, numbers in at.others]
     signs, leads = at.signs, at.leads.size
+    above = np.zeros((*shape, 0), dtype=bool)
     if leads or stretches:
-        above, clear = _asked(plan, stretches, shape, machine, env)
+        above, clear = _asked(plan, there, stretches, shape, machine, env)
     if leads:
         signs = np.broadcast_to(signs, first.shape).copy()
         signs[..., at.leads] = np.where(above[..., :leads], 1, -1)
@@ -118,7 +127,14 @@ def sides_of(plan: StepIntegral, places: Array, machine: Evaluator, env: Mapping
         back = np.empty_like(turned)
         np.put_along_axis(back, order, turned, -1)
         change[..., own, : back.shape[-1]] = back
-    return Sides(first, change, sure)
+    return Sides(first, change, sure, above[..., :leads], bool(stretches))
+
+
+def same_leads(plan: StepIntegral, sides: Sides, machine: Evaluator, env: Mapping[str, Value]) -> bool:
+    """Whether the leading coefficients of one member, which are all that is asked for, have the signs that they have
+    for these sides."""
+    above, clear = _asked(plan, True, (), (), machine, env)
+    return bool(clear.all() and (above == sides.leads).all())
 
 
 def _roots(places: Array, rows: Ints, signs: Ints) -> tuple[Bools, Ints, Bools]:
@@ -146,20 +162,20 @@ def _stretches(places: Array, rows: Ints) -> tuple[Array, Ints]:
 
 
 def _asked(
-    plan: StepIntegral, stretches: Sequence[tuple[Array, Ints]], shape: tuple[int, ...], machine: Evaluator,
-    env: Mapping[str, Value],
+    plan: StepIntegral, there: bool, stretches: Sequence[tuple[Array, Ints]], shape: tuple[int, ...],
+    machine: Evaluator, env: Mapping[str, Value],
 ) -> tuple[Bools, Bools]:  # fmt: skip
     """Whether what is asked is above 0, surfaces in the middles of stretches, and whether that is clear of rounding,
     ([B,] T)."""
-    at = layout(plan)
+    at, asked = layout(plan, there), plan.asked[not there]
     where = np.empty((len(at.probes), *shape))
     for (_, numbers), (ends, _) in zip(at.others, stretches, strict=True):
         middles = 0.5 * (ends[..., 1:] + ends[..., :-1])
         where[numbers] = np.moveaxis(middles, 0, -1) if shape else middles
-    values = np.zeros((2, len(children(plan.asked.body)), *shape))
+    values = np.zeros((2, len(children(asked.body)), *shape))
     places = dict(zip(at.probes, map(Cell, where if shape else where.tolist()), strict=True))
-    here: dict[str, Value] = {name: places.get(name) or _still(env[name]) for name in plan.asked.params}
-    for number, cell in enumerate(evaluated(plan.asked, machine.with_directions(0).tracking(), here)):
+    here: dict[str, Value] = {name: places.get(name) or _still(env[name]) for name in asked.params}
+    for number, cell in enumerate(evaluated(asked, machine.with_directions(0).tracking(), here)):
         values[0, number], values[1, number] = cell.v, 0.0 if cell.e is None else cell.e
     both = np.moveaxis(values, 1, -1)
     return both[0] > 0, np.abs(both[0]) > CLEAR * both[1]

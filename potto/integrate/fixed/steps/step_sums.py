@@ -64,12 +64,11 @@ def step_sum(
 
 
 def lit(cells: StepCells, plan: StepIntegral) -> StepCells:
-    """The cells of one member that have a width, without those on which nothing is integrated."""
-    count = int(cells.inside)
+    """The cells of one member without those on which nothing is integrated."""
     if not plan.dark:
-        return cells if count == cells.width.shape[-1] else cells.pick((slice(count),))
-    kept = np.any([number[:, :count].any(axis=0) for number, _ in cells.heights], axis=0)
-    return cells if kept.all() and count == cells.width.shape[-1] else cells.pick((np.flatnonzero(kept),))
+        return cells
+    kept = np.any([number.any(axis=0) for number, _ in cells.heights], axis=0)
+    return cells if kept.all() else cells.pick((np.flatnonzero(kept),))
 
 
 def _added(
