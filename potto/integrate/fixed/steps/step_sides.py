@@ -100,8 +100,8 @@ def layout(plan: StepIntegral, there: bool = True) -> _Layout:
 def sides_of(plan: StepIntegral, places: Array, machine: Evaluator, env: Mapping[str, Value]) -> Sides:
     """places: ([B,] R), of the rows of the frame, nan for a root that is not there."""
     untold, shape = layout(plan).untold, places.shape[:-1]
-    there = not (untold.size and np.isnan(places[..., untold]).any())
-    at = layout(plan, there)
+    complete = not (untold.size and np.isnan(places[..., untold]).any())
+    at = layout(plan, complete)
     first = np.zeros((*shape, len(plan.surfaces)), dtype=bool)
     change = np.zeros((*shape, *at.rows.shape), dtype=np.int8)
     sure = np.ones(shape, dtype=bool)
@@ -109,7 +109,7 @@ def sides_of(plan: StepIntegral, places: Array, machine: Evaluator, env: Mapping
     signs, leads = at.signs, at.leads.size
     above = np.zeros((*shape, 0), dtype=bool)
     if leads or stretches:
-        above, clear = _asked(plan, there, stretches, shape, machine, env)
+        above, clear = _asked(plan, complete, stretches, shape, machine, env)
     if leads:
         signs = np.broadcast_to(signs, first.shape).copy()
         signs[..., at.leads] = np.where(above[..., :leads], 1, -1)
