@@ -37,6 +37,18 @@ def covered(answer: Any, value: Any, slope: Any, rtol: float = 1e-11) -> None:
         assert (error <= rtol * np.maximum(np.abs(exact), 1e-2)).all()
 
 
+def rules(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """Of each rule that is applied, to how many cells."""
+    cells, applied = list[int](), ProductRule.applied
+
+    def counted(self: ProductRule, env: Any, index: Any) -> Any:
+        cells.append(index.size)
+        return applied(self, env, index)
+
+    monkeypatch.setattr(ProductRule, "applied", counted)
+    return cells
+
+
 def test_the_line_of_equation_1() -> None:
     shade = "1/(sqrt(2)*(x + y + c) + 2)^2"
     answer = answered(f"def f(c) integral ([0, 1], [0, 1]) {shade} * [x + y + c >= 0] d(x, y)", PLAIN)
@@ -152,20 +164,36 @@ def test_few_cells_that_are_left_take_one_rule_more(backend: Any, monkeypatch: p
         pytest.importorskip("llvmlite")
     text = "def f(a, b, r) integral ([a, a + 1/16], [b, b + 1/16]) [(x - 0.5)^2 + (y - 0.5)^2 < r] d(x, y)"
     a, b = (z.ravel() for z in np.meshgrid(np.arange(16) / 16, np.arange(16) / 16))
-    cells: list[int] = []
-    applied = ProductRule.applied
-
-    def counted(self: ProductRule, env: Any, index: Any) -> Any:
-        cells.append(index.size)
-        return applied(self, env, index)
-
-    monkeypatch.setattr(ProductRule, "applied", counted)
+    cells = rules(monkeypatch)
     with potto.settings(backend=backend):
         answer = potto.grad(potto.compile(text).f, "r")(a, b, 0.1)
     first, left, *turning = cells
     assert first > 50 and 2 < left < first / 4 and turning == [2, 2]  # left and right of the centre
     assert abs(answer.value.sum() - 0.1 * math.pi) <= answer.error.sum() <= 1e-13
     assert abs(answer.tangent.sum() - math.pi) <= answer.tangent_error.sum() <= 1e-11
+
+
+def test_cells_with_coefficients_of_rounding_are_told_by_the_first_ones(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Along the right of a disc, where it turns: the last of 12 coefficients of the two cells there are rounding, as
+    are those of any rule with more nodes. The areas by rows, up to where the arc leaves a pixel, to 30 digits."""
+    text = "def f(a, b, r) integral ([a, a + 1/256], [b, b + 1/256]) [(x - 0.5)^2 + (y - 0.5)^2 < r] d(x, y)"
+    b = np.arange(102, 153) / 256
+    a = np.floor(256 * (0.5 + np.sqrt(0.1 - (b + 1 / 512 - 0.5) ** 2))) / 256
+    cells = rules(monkeypatch)
+    with potto.settings(backend="numpy"):
+        answer = potto.grad(potto.compile(text).f, "r")(a, b, 0.1)
+    assert max(cells) > 90 and [n for n in cells if n <= 2] == [2]
+
+    def area(low: mp.mpf, down: mp.mpf) -> mp.mpf:
+        h, half = mp.mpf(1) / 256, mp.mpf("0.5")
+        leaves = [mp.sqrt(max(mp.mpf(0.1) - (x - half) ** 2, 0)) for x in (low, low + h)]
+        ends = [down, *sorted(y for c in leaves for y in (half - c, half + c) if down < y < down + h), down + h]
+        return mp.quad(lambda y: min(max(half + mp.sqrt(mp.mpf(0.1) - (y - half) ** 2) - low, 0), h), ends)
+
+    with mp.workdps(30):
+        for i in (0, 25, 26, 50):
+            exact = area(mp.mpf(a[i]), mp.mpf(b[i]))
+            assert abs(answer.value[i] - float(exact)) <= answer.error[i] <= 1e-16
 
 
 def test_cuts_that_are_one_and_move_apart_have_two_sides() -> None:

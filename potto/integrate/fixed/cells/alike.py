@@ -156,10 +156,16 @@ def _settled(
     tried, most = _tried(plan, exact, machine, env, cell, todo, tight), 0.0
     while tried and todo.size:
         number = _last_worth(tried, todo.size, most)
-        rule = replace(tried[number], skipped=tuple([own.orders for own in tried[:number]]))
+        rule = _after(tried, number)
         most = max(most, BESIDE * rule.nodes * todo.size)
         todo, tried = _applied([(rule, todo)], env, total, fine), tried[number + 1 :]
     return fine
+
+
+def _after(rules: Sequence[ProductRule], number: int) -> ProductRule:
+    """One of some rules, where those before it are skipped."""
+    rule = rules[number]
+    return replace(rule, skipped=(*rule.skipped, *[own.orders for own in rules[:number]])) if number else rule
 
 
 def _last_worth(rules: Sequence[ProductRule], cells: int, most: float) -> int:
@@ -226,12 +232,11 @@ def _tried(
     if all(known):
         return tried[:1]
     if todo.size <= FEW:
-        return tried[PROBE:] if tight else tried
+        return [_after(tried, PROBE), *tried[PROBE + 1 :]] if tight else tried
     few = todo[:: max(1, todo.size // PILOTS)]
     first = tried[: PROBE + 1]
     foreseen = first[-1].foreseen(env, few, first)
     later = (rule.good(rule.applied(env, few)) for rule in tried[PROBE + 1 : -1])
-    for number, good in enumerate(itertools.chain(foreseen, later)):
-        if good.mean() >= ENOUGH:
-            return tried[number:]
-    return tried[-1:]
+    good = (number for number, fine in enumerate(itertools.chain(foreseen, later)) if fine.mean() >= ENOUGH)
+    number = next(good, len(tried) - 1)
+    return [_after(tried, number), *tried[number + 1 :]]
