@@ -18,7 +18,7 @@ from potto.integrate.fixed.moving_sums import SUMMED
 # times more rounding may be than at the nodes where it is followed.
 PART, ADDED, BESIDE = range(3)
 # At how many nodes rounding is followed at each; at a few of them, where there are more.
-TRACKED = 1 << 12
+TRACKED = 1 << 14
 # How many times more rounding may be elsewhere than at the nodes where it is followed.
 ELSEWHERE = 2.0
 # Behind the columns the frame tells where the sums are, and how long their rows; whether what is known of the whole
