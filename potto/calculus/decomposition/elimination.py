@@ -170,9 +170,7 @@ def _in_order(term: Integral, state: str | None, known: tuple[Distribution, ...]
     return None
 
 
-def _densities(
-    term: Term, known: tuple[Distribution, ...]
-) -> tuple[Term, tuple[tuple[Distribution, Term], ...]]:  # fmt: skip
+def _densities(term: Term, known: tuple[Distribution, ...]) -> tuple[Term, tuple[tuple[Distribution, Term], ...]]:
     """A term without the factors of it that are densities, and these: whose, and at which places."""
     by_name = {distribution.variable: distribution for distribution in known}
     rest: list[Term] = []

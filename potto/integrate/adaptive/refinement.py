@@ -1,11 +1,9 @@
 """How far off pieces may be, which are not accurate enough, and which are as accurate as they can be.
 
-Owns `Tally`, `filled`, `too_coarse`, `stragglers`, `missed_peak`, `count_unreached` and `doubtful`.
-
-A piece is refined until its error is
-a small enough part of what it is added to, or until what is left of it is rounding. Where an integrand takes up little
-of its range, nodes that hardly count need less accuracy. Estimates see only what the nodes see, so the ends of segments
-and the agreement of two forms of each derivative are looked at besides.
+Owns `Tally`, `filled`, `too_coarse`, `stragglers`, `missed_peak`, `count_unreached` and `doubtful`. A piece is refined
+until its error is a small enough part of what it is added to, or until what is left of it is rounding. Where an
+integrand takes up little of its range, nodes that hardly count need less accuracy. Estimates see only what the nodes
+see, so the ends of segments and the agreement of two forms of each derivative are looked at besides.
 """
 
 from __future__ import annotations
