@@ -13,6 +13,7 @@ from msgspec import Struct
 
 from potto.calculus.algebra.radicals import NAN
 from potto.calculus.algebra.ranges import Box
+from potto.calculus.differentiation.derivative import vanishes
 from potto.calculus.differentiation.root_names import RootNames
 from potto.calculus.explanation.bound_names import as_written, named_alike
 from potto.calculus.explanation.decimals import in_decimals
@@ -233,13 +234,10 @@ def over_functions(term: Term) -> bool:
 
 def _moves(arg: Term) -> bool:
     """Whether an argument of a derivative is one that can move what it is given to."""
-    return not (isinstance(arg, Tuple) and len(arg.items) == 2 and _zero(arg.items[1])) and not isinstance(arg, Deriv)
+    rests = isinstance(arg, Tuple) and len(arg.items) == 2 and vanishes(arg.items[1])
+    return not (rests or isinstance(arg, Deriv))
 
 
 def _shortened(arg: Term) -> Term:
     """A plain number stands for a dual that does not move."""
     return arg.items[0] if isinstance(arg, Tuple) and len(arg.items) == 2 and arg.items[1] is ZERO else arg
-
-
-def _zero(term: Term) -> bool:
-    return term is ZERO or (isinstance(term, Tuple) and all(map(_zero, term.items)))
