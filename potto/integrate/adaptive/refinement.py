@@ -232,27 +232,28 @@ def missed_peak(work: PanelBatch, p: Pieces, ends: Ends) -> Any:
 
 
 def count_unreached(work: PanelBatch, p: Pieces, ends: Ends | None) -> Pieces:
-    """With what may sit at ends of segments that nodes come to nothing of, in the errors of pieces there.
+    """With what may sit at ends of segments, in the errors of pieces there, of members of which no nodes see anything.
 
-    One that is too narrow to be halved may hold as much as if it were as high as at its end all over. Of members of which
-    no nodes see anything, any may hold what the integral further in is off at the end, and of derivatives nothing is
-    known where something is held; of others these would be what rounding leaves where a region begins.
+    A piece that is too narrow to be halved may hold as much as if it were as high as at its end all over; of
+    derivatives nothing is known then. Any may hold what the integral further in is off at the end. Where nodes see
+    something these would be what rounding leaves where a region begins, or a pole that is integrable.
     """
     if ends is None:
         return p
     seg, m = work.seg, work.width
     reach, owner = seg.b - seg.a, seg.owner[p.segment]
     dark = np.bincount(owner, p.most.reshape(-1, owner.size).max(axis=0) > 0, minlength=work.batch)[owner] == 0
+    if not dark.any():
+        return p
     width = np.where(np.isinf(reach), 0.0, reach)[p.segment] * (p.u1 - p.u0)
     narrow = p.u1 - p.u0 < NARROWEST
     error = p.error.reshape(m, -1, p.segment.size).copy()
     for f, off, touches in ((ends.low, ends.low_error, p.u0 == 0), (ends.high, ends.high_error, p.u1 == 1)):
-        height, doubt = np.abs(f[:, p.segment]), off[:, p.segment]
-        held = np.where(np.isfinite(height) & narrow & touches, height, 0.0) * width
-        held = np.where(held - ROUNDED * doubt * width > PEAK * p.most, held, 0.0)
+        height = np.abs(f[:, p.segment])
+        held = np.where(np.isfinite(height) & narrow & touches & dark, height, 0.0) * width
         unseen = touches & dark & (width > 0) & (not work.last)
-        error[:, 0] += held + np.where(unseen, np.where(np.isfinite(height), doubt * width, np.inf), 0.0)
-        error[:, 1:] = np.where((dark & (held > 0))[:, None], np.inf, error[:, 1:])
+        error[:, 0] += held + np.where(unseen, np.where(np.isfinite(height), off[:, p.segment] * width, np.inf), 0.0)
+        error[:, 1:] = np.where(held[:, None] > 0, np.inf, error[:, 1:])
     return replace(p, error=error.reshape(p.error.shape))
 
 
