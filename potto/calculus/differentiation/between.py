@@ -18,6 +18,8 @@ from potto.primitives import PRIMITIVES
 
 def between(at: Term, lo: Term, hi: Term, value: Term) -> Term:
     """`value` where lo < at < hi, minus it where hi < at < lo, 0 elsewhere and where `at` is not a number."""
+    if is_zero(sub(hi, lo)):
+        return zero_like(value)
     upward = value
     if finite(hi):
         upward = above(sub(hi, at), upward)

@@ -82,9 +82,9 @@ def at_surfaces(
     branches = branches_of(node.body, node.variables)
     surfaces: dict[Term, list[Branch]] = {}
     for item in branches:
-        for factor in factors(item.surface):
-            if factor.free & frozenset(node.variables) and factor.free & moving:
-                surfaces.setdefault(normalized_surface(factor)[0], []).append(item)
+        for surface, _ in map(normalized_surface, factors(item.surface)):  # without what cancels, as in x*(t - t)
+            if surface.free & frozenset(node.variables) and surface.free & moving:
+                surfaces.setdefault(surface, []).append(item)
     terms: list[Term] = []
     met: list[SurfaceRoot] = []
     for surface, members in surfaces.items():
