@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 
 import potto
@@ -138,3 +139,74 @@ def test_an_edge_that_is_a_bound(bounds: str, body: str, exact: float) -> None:
     r = potto.hessian(potto.compile(f"def f(t) integral {bounds} {body} d(x)").f)(0.6)
     assert abs(r.value - exact) <= r.error + 1e-15
     assert r.error < 1e-12
+
+
+# What is nothing for all parameters: a coefficient, or a range.
+NOTHING = [
+    ("integral [0, 1] [x*(t - t) <= t]*exp(x*t) d(x)", 0.3),  # of x^2 exp(x t), below
+    ("integral [0, 1] [x*(t^2 - t*t) >= t - 1]*exp(x*t) d(x)", 0.3),
+    ("integral ([0, 1], [0, 1]) [(x + y)*(t - t) <= t]*exp(x*t) d(x, y)", 0.3),
+    ("integral [t, t] (if diffeo(2*x - s(t)) then t - s(t) else 1 + s(t)) d(x)", 0.0),
+    ("integral [s(t), s(t)] max([x^2 + (t + 3)*x < (t + 3)^2]*(t - x), t^2) d(x)", 0.0),
+    ("integral [s(t), 2*s(t)/2] ([0.7*x > t]*x)^3 d(x)", 0.0),
+]
+
+
+@pytest.mark.parametrize(("body", "t"), NOTHING, ids=[row[0] for row in NOTHING])
+def test_what_is_nothing_has_no_deltas(body: str, t: float) -> None:
+    m = potto.compile(f"def s(t) 1 + t/2\ndef f(t) {body}")
+    r = potto.hessian(m.f)(0.3)
+    exact = (math.exp(0.3) * (0.3**2 - 2 * 0.3 + 2) - 2) / 0.3**3 if t else 0.0
+    assert abs(r.value - exact) <= r.error + 1e-15
+    assert r.error < 1e-12
+
+
+# Recursions that jump as often as their first argument says, and the second derivative of the integral at t = 0.5.
+RECURSIONS = {
+    "summands": ("if n > 0 then [x < t^2*n/4] + g(n - 1, x, t) else 0", 3.0),  # of 3 t^2/2
+    "factors": ("if n > 0 then [x < t*n/4]*x*t*g(n - 1, x, t) else 1", 42*0.5**5/1024),  # of (t/4)^4/4 t^3
+    "the same factor": ("if n > 0 then [x < t]*t*g(n - 1, x, t) else 1", 12*0.5**2),  # of t^4
+    "a condition at the end": ("if n > 0 then x*g(n - 1, x, t) else [x < t]", 3*0.5**2),  # of t^4/4
+    "kinks": ("if n > 0 then max(x*g(n - 1, x, t), t) else x", 0.5**-0.75/4),  # of (4 t^(5/4) + 1)/5
+    # of t/3 + 2 t^3/25 + 3 t^2/5
+    "two calls": ("if n > 1 then x*g(n - 1, x, t) + [x < t*n/5]*g(n - 2, x, t) else t", 1.44),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("body", "exact"), RECURSIONS.values(), ids=RECURSIONS)
+def test_a_recursion_is_written_out(body: str, exact: float) -> None:
+    r = potto.hessian(potto.compile(f"def g(n, x, t) {body}\ndef f(t) integral [0, 1] g(3, x, t) d(x)").f)(0.5)
+    assert abs(r.value - exact) <= r.error + 1e-15
+    assert r.error < 1e-12
+
+
+def test_a_surface_that_is_a_recursion() -> None:
+    """x^(n + 1) < t: the length is t^(1/(n + 1))."""
+    m = potto.compile("def g(n, x) if n > 0 then x*g(n - 1, x) else x\ndef f(n, t) integral [0, 1] [g(n, x) < t] d(x)")
+    for n in (3, 40):
+        r, power = potto.hessian(m.f, ["t"])(n, 0.5), 1 / (n + 1)
+        assert abs(r.value - power * (power - 1) * 0.5 ** (power - 2)) <= r.error + 1e-15
+        assert r.error < 1e-12
+
+
+def test_members_of_a_batch_go_to_depths_of_their_own() -> None:
+    """The length of the least of the intervals is t/4, if there are any."""
+    m = potto.compile("""
+def g(n, x, t) if n > 0 then [x < t*n/4]*g(n - 1, x, t) else 1
+def f(n, t) integral [0, 1] t^2*g(n, x, t) d(x)
+""")
+    n, t = np.array([2.0, 0.0, 3.0, 1.0]), np.array([0.5, 0.5, 0.6, 0.2])
+    r = potto.hessian(m.f, ["t"])(n, t)
+    assert (abs(r.value - np.where(n > 0, 1.5 * t, 2.0)) <= r.error + 1e-15).all()
+    assert (r.error < 1e-12).all()
+
+
+@pytest.mark.parametrize("n", [3, 200])
+def test_a_recursion_that_places_deltas_is_refused_where_its_depth_is_not_known(n: int) -> None:
+    m = potto.compile(
+        "def g(n, x) if n > 0 then x*g(n - 1, x) else x\ndef f(n, t) integral [0, 1] delta(g(n, x) - t) d(x)"
+    )
+    with pytest.raises(potto.PottoError) as caught:
+        potto.hessian(m.f, ["t"])(n, 0.5)
+    assert [d.code for d in caught.value.diagnostics] == ["P0510"]
+    assert "recursion" in caught.value.diagnostics[0].message

@@ -121,17 +121,25 @@ def test_what_a_function_under_two_derivatives_has_captured_moves() -> None:
     assert got.value == (13.5, 27.0) and got.tangent == (27.0, 36.0)  # of 4 t^3
 
 
-def test_what_is_not_seen_is_refused() -> None:
-    m = potto.compile(
-        PROGRAM
-        + """
+RECURSION = """
 def often(n, y, a) if n > 0 then often(n - 1, y, a) + snd(deriv(mixed)((y, 0), (a, 1))) else 0
-def f(a) integral [0, 1] often(2, x, a) d(x)
+def total(n, a) integral [0, 1] often(n, x, a) d(x)
 """
-    )
-    with pytest.raises(potto.PottoError) as caught:
-        m.f(0.4)
-    assert [d.code for d in caught.value.diagnostics] == ["P0510"]
+
+
+def test_a_recursion_shows_its_deltas_once_it_is_written_out() -> None:
+    m = potto.compile(f"{PROGRAM}{RECURSION}def f(a) total(2, a)")
+    got = potto.deriv(m.f)((0.4, 1.0))
+    assert abs(got.value - 2 * M) <= 1e-14 + got.error and got.error <= 1e-11
+    assert abs(got.tangent + 2 * slope(A)) <= 1e-14 + got.tangent_error and got.tangent_error <= 1e-11
+
+
+def test_what_is_not_seen_is_refused() -> None:
+    m = potto.compile(PROGRAM + RECURSION)
+    for call in (lambda: m.total(500, 0.4), lambda: potto.hessian(m.total, ["a"])(2, 0.4)):
+        with pytest.raises(potto.PottoError) as caught:
+            call()
+        assert [d.code for d in caught.value.diagnostics] == ["P0510"]
 
 
 def test_a_tangent_that_jumps_is_cut_where_it_jumps() -> None:

@@ -28,6 +28,7 @@ class Reach:
         self.known: dict[Term, frozenset[type]] = {}
         self.known_branches: dict[Term, int] = {}
         self.known_derived: dict[Term, frozenset[type]] = {}
+        self.known_recursions: dict[Term, frozenset[Global]] = {}
         self.known_spikes: dict[Term, bool] = {}
         self.results: dict[Any, dict[Any, Any]] = {}
 
@@ -60,6 +61,18 @@ class Reach:
         """Whether something that jumps is derived, or has deltas itself, or something that bends twice."""
         found = self.derived(term)
         return bool(found & {Branch, Delta}) or found >= {Deriv, Prim}
+
+    def recursions(self, term: Term) -> frozenset[Global]:
+        """The definitions that are reached, and lead to themselves."""
+        found = self.known_recursions.get(term)
+        if found is None:
+            names = {node for node in self._all(term) if isinstance(node, Global)}
+            found = self.known_recursions[term] = frozenset(filter(self._returns, names))
+        return found
+
+    def _returns(self, name: Global) -> bool:
+        known = self.resolve(name)
+        return known is not None and any(name in nodes for nodes in reached(known, resolve=self.resolve))
 
     def spikes(self, function: Term) -> bool:
         """Whether what a function gives has deltas that no integral of its own is around."""

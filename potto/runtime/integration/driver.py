@@ -34,6 +34,7 @@ from potto.runtime.integration.methods.members import Whole
 from potto.runtime.integration.preparation.arrays import Differ, Read, as_written, in_numbers, met, without_arrays
 from potto.runtime.integration.preparation.compared import compares, with_compared
 from potto.runtime.integration.preparation.prepared import filled, held, placed, prepared
+from potto.runtime.integration.preparation.recursions import in_sight
 from potto.runtime.integration.preparation.taken_apart import together
 from potto.runtime.integration.problem import Mixed, Problem, linked
 from potto.runtime.integration.solving import solve
@@ -58,6 +59,10 @@ def integral(machine: Machine, term: Integral, env: dict[str, Value]) -> Value:
     if different is not None:
         return _by_choice(machine, term, env, different)
     term, env = in_numbers(term, env)
+    try:
+        term = in_sight(machine, term, env)
+    except Differ as differ:
+        return _by_length(machine, term, env, differ.ends)
     known = machine.record.surfaces()
     value = locally(machine, env, lambda own, here: _of_numbers(own, term, here))
     as_written(machine.record, known, read)
@@ -102,7 +107,7 @@ def _by_choice(machine: Machine, term: Integral, env: dict[str, Value], differen
 
 
 def _by_length(machine: Machine, term: Integral, env: dict[str, Value], ends: Array) -> Value:
-    """The members whose loops are of one length together."""
+    """The members whose loops and recursions are of one length together."""
     shape = np.broadcast_shapes(ends.shape, *(a.shape for value in env.values() for a in all_arrays(value)))
     full = np.broadcast_to(ends, shape)
     masks = [full == end for end in np.unique(ends)]

@@ -15,6 +15,7 @@ from potto.diagnostics import PottoError
 from potto.kernels import errors
 from potto.runtime.evaluation.functions import Closure, Derivative, Paired
 from potto.runtime.evaluation.machine import Machine
+from potto.runtime.integration.preparation.recursions import alone_in_sight
 from potto.runtime.integration.preparation.uncounted import NOT_COUNTED
 
 
@@ -36,7 +37,7 @@ def _dual(machine: Machine, function: Lam) -> Lam:
             return machine.linker.term(name.module, name.name)
 
         try:
-            found = symbolic(function, resolve, machine.frozen)
+            found = symbolic(alone_in_sight(machine, function), resolve, machine.frozen)
         except (NoClosedForm, NotSmooth) as reason:
             raise PottoError([NOT_COUNTED(
                 errors.NOWHERE, f"no second derivative was found: {reason}", help="differentiate only once",

@@ -1,6 +1,6 @@
 """Arrays end where an integral begins: what it reads of them is found beside it, and it integrates numbers.
 
-Owns `without_arrays`, `found_beside`, `in_numbers`, `in_places` and `as_written`.
+Owns `without_arrays`, `whole`, `found_beside`, `in_numbers`, `in_places` and `as_written`.
 """
 
 from __future__ import annotations
@@ -74,7 +74,7 @@ def without_arrays(machine: Machine, term: Integral, env: Env) -> tuple[Term, En
         return found, {name: env[name] for name in found.free}, {}
     term = found
     while ends := loops(term):
-        known = tuple((end, _whole(machine, end, env)) for end in ends)
+        known = tuple((end, whole(machine, end, env)) for end in ends)
         try:
             term = unrolled(term, known)
         except TooMany:
@@ -102,8 +102,8 @@ def _outside(term: Integral, arrays: frozenset[str], reach: Reach) -> Term:
     return each_integral(found, summands)
 
 
-def _whole(machine: Machine, end: Term, env: Env) -> float:
-    """The bound of a loop, which is the same for all members."""
+def whole(machine: Machine, end: Term, env: Env) -> float:
+    """The bound of a loop, or a condition that ends a recursion, which is the same for all members. Raises Differ."""
     value = machine.with_directions(0).term(end, {name: env[name] for name in end.free})
     if not isinstance(value, Cell):
         raise errors.not_a_number(value)
@@ -114,7 +114,7 @@ def _whole(machine: Machine, end: Term, env: Env) -> float:
 
 
 class Differ(Exception):
-    """The members of a batch have loops of different lengths, which begin or end at these numbers."""
+    """The members of a batch have loops or recursions of different lengths, which these numbers decide."""
 
     def __init__(self, ends: Number) -> None:
         self.ends = np.asarray(ends)

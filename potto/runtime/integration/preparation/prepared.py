@@ -119,7 +119,10 @@ def placed(term: Integral, again: bool, reach: Reach) -> Integral:
     if not any(isinstance(n, Delta) and any(isinstance(g, Global | App) for g in postorder(*n.coordinates))
                for n in postorder(term)):  # fmt: skip
         return term
-    return _with_deltas(term, lambda delta: expanded(delta, reach.resolve))
+    term = _with_deltas(term, lambda delta: expanded(delta, reach.resolve))
+    if any(reach.recursions(node) for node in postorder(term) if isinstance(node, Delta)):
+        raise not_found("a recursion places them, and goes deeper than is written out")
+    return term
 
 
 def _with_deltas(term: Integral, change: Callable[[Delta], Term]) -> Integral:
@@ -241,7 +244,7 @@ def _counted(term: Integral, reach: Reach, again: bool) -> Integral:
     if not body.free <= term.body.free or any(
         reach.deltas(call.function) or _is_unknown(call.function) for call in calls
     ):
-        raise not_found("what is differentiated is out of sight")
+        raise not_found("what is differentiated is not known here, or a recursion of too many calls")
     before = {node for node in postorder(term.body) if isinstance(node, Delta)}
     found = any(isinstance(n, Delta) and n not in before and n.coordinates[0].free & variables for n in postorder(body))
     return with_integrand(term, body) if found or again else term
