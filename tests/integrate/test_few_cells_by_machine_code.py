@@ -8,6 +8,7 @@ import mpmath as mp
 import pytest
 
 import potto
+from potto.integrate.fixed import straight
 from potto.integrate.fixed.proved_sums import alone
 from potto.kernels.making import counts
 
@@ -27,13 +28,14 @@ INTEGRANDS: dict[str, Callable[[mp.mpf], mp.mpf]] = {
 
 
 def bands(integrand: str, variable: str, cells: int) -> str:
-    """From t/2 to t, t/4 to t/3 and so on, at u = 1: what has numbers for slopes goes by step functions."""
+    """From t/2 to t, t/4 to t/3 and so on, at u = 1."""
     sides = " + ".join(f"{(-1) ** (k + 1)}*[u*{variable} < t/{k}]" for k in range(1, 2 * cells + 1))
     return f"def f(t, u) integral [0, 2] {integrand.replace('#', variable)}*({sides}) d({variable})"
 
 
 def noted(monkeypatch: pytest.MonkeyPatch) -> list[int]:
-    """Of how many cells it is asked how many are to be done at a time."""
+    """Of how many cells it is asked how many are to be done at a time, where cells are not those of step functions."""
+    monkeypatch.setattr(straight, "FEW_CUTS", straight.MOST_CUTS)
     asked, lanes = list[int](), alone._lanes
 
     def asking(count: int) -> int:
