@@ -41,7 +41,8 @@ def guarded(term: Term, box: Box | None = None, known: tuple[Inequality, ...] = 
                 return _where(own, ONE, box)
             case Prim(op="mul", args=args) if held := _held(args):
                 inside = (*known, *held)
-                args = tuple(arg if conditions(arg) is not None else guarded(arg, box, inside) for arg in args)
+                found = [(conditions(arg), arg) for arg in args]
+                args = tuple(guarded(arg, box, inside) if own is None else _where(own, ONE, box) for own, arg in found)
                 return _product(args, ONE, box, known) or mul(*args)
             case Prim(op="mul", args=args):
                 return _product(args, ONE, box, known) or new
