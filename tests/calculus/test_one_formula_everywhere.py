@@ -41,7 +41,8 @@ def packed(text: str) -> str:
     return re.sub(r"\s", "", text)
 
 
-def check(library: Library, file: str, name: str, conversation: Conversation) -> None:
+def check(conversation: Conversation, file: str, name: str) -> None:
+    library = conversation.world
     found = explain_derivative(library.db, file, name)
     if found.by:  # it is that of another one, while the prompt differentiates it once more
         return
@@ -128,13 +129,12 @@ def test_of_two_names_that_of_the_variable_comes_first() -> None:
     ids=lambda path: f"{path.parent.name}/{path.stem}",
 )  # fmt: skip
 def test_examples(path: Path) -> None:
-    library = Library([str(path.parent)])
-    file = library.key(str(path))
     conversation = Conversation([str(path.parent)])
+    db, file = conversation.db, conversation.world.key(str(path))
     assert not respond(conversation, f":load {path}").failed
-    for name in names(library.db, file):
-        if isinstance(interface(library.db, file, name).type, Function):
-            check(library, file, name, conversation)
+    for name in names(db, file):
+        if isinstance(interface(db, file, name).type, Function):
+            check(conversation, file, name)
 
 
 @pytest.mark.parametrize("seed", range(examples(50, 500)))
@@ -143,7 +143,6 @@ def test_generated(seed: int, tmp_path: Path) -> None:
     text = definition(rng) if seed % 2 else program(rng)[0]
     path = tmp_path / "generated.po"
     path.write_text(text, encoding="utf-8")
-    library = Library([str(tmp_path)])
     conversation = Conversation([str(tmp_path)])
     assert not respond(conversation, f":load {path}").failed
-    check(library, library.key(str(path)), "f", conversation)
+    check(conversation, conversation.world.key(str(path)), "f")

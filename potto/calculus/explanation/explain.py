@@ -62,10 +62,11 @@ from potto.core.terms import (
 from potto.diagnostics import PottoError
 from potto.elaborate import core_term
 from potto.modules import definition
-from potto.query import Database
+from potto.query import Database, query
 from potto.types import Type, derivative_type, format_type, groups_of, interface
 
 
+@query
 def explain_derivative(db: Database, file: str, name: str) -> DerivativeText:
     """The derivative of a definition, in symbols. What is a derivative itself is explained by what it is one of."""
 
