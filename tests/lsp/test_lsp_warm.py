@@ -95,6 +95,36 @@ def test_what_uses_a_record_is_not_looked_through_for_conditions_while_that_is_w
         assert session.told[0]["diagnostics"] == []
 
 
+INSIDE = "from beside import plain1\n\ndef inside(r, x, y) [x^2 + y^2 < r]\n"
+SHONE = "".join(f"\ndef lit{n}(r, t) integral [0, 1] inside(r, x, t)*{n}*x d(x)\n" for n in range(OTHERS))
+BESIDE = "".join(f"\ndef beside{n}(r, t) integral [0, 1] plain1([x < r] * {n}*t) d(x)\n" for n in range(OTHERS))
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong"),
+    [
+        ("[x^2", "[(x^2"),  # cannot be read
+        ("< r]", "< r](x)"),  # has no type
+        ("(r, x, y)", "(1r, x, y)"),
+        ("from beside", "from besides"),  # there is no such module
+    ],
+)
+def test_what_uses_a_guess_is_not_looked_through_for_conditions_until_that_is_mended(
+    session: Session, right: str, wrong: str
+) -> None:
+    (session.folder / "beside.po").write_text("def plain1(t) t + 1\n")
+    text = INSIDE + SHONE + BESIDE
+    session.edit("leaf", text)
+    session.check()
+    for _ in range(2):
+        ran = session.ran("leaf", text.replace(right, wrong, 1))
+        assert len(session.told[0]["diagnostics"]) == 1
+        assert ran["_analyses"] <= OTHERS + 1
+        assert ran["core"] <= 1 and ran["exported"] <= 1, ran
+        assert session.ran("leaf", text)["core"] <= 1
+        assert session.told[0]["diagnostics"] == []
+
+
 def test_what_nobody_reads_is_looked_at_by_nobody(session: Session) -> None:
     for body in ("2*t", "3*t", "4*t"):
         reused = session.ran("leaf", LEAF.replace("alone(t) t", f"alone(t) {body}"), "reused")

@@ -28,6 +28,7 @@ from potto.calculus.checking.solvability import (
     searched,
     singular,
 )
+from potto.calculus.checking.soundness import is_sound, rests_on_guesses
 from potto.calculus.differentiation.deltas import without_deltas
 from potto.calculus.differentiation.derivative import NotSmooth
 from potto.calculus.differentiation.dual import Differentiator
@@ -57,13 +58,10 @@ from potto.core.terms import (
 from potto.diagnostics import Diagnostic, PottoError
 from potto.elaborate import core, core_term, diffeo_core
 from potto.modules import chunk_text, definition
-from potto.modules.graph import dependencies
 from potto.query import Database, query
 from potto.source import Span
 from potto.syntax import nodes
 from potto.syntax.walk import walk
-from potto.types import check_definition, interface, shape
-from potto.types.types import TupleOf, result_of
 
 _Bounds = tuple[tuple[str, tuple[float, float]], ...]
 
@@ -99,7 +97,7 @@ def check_conditions(db: Database, file: str, name: str) -> tuple[Diagnostic, ..
     item = definition(db, file, name)
     if isinstance(item, nodes.DiffeoDefinition):
         return _studied(db, file, name).diagnostics
-    if not may_integrate(db, file, name) or _of_unknown_records(db, file, name):
+    if not may_integrate(db, file, name) or rests_on_guesses(db, file, name):
         return ()
     elaborated = core(db, file, name)
     found = conditions_of(elaborated.term, lambda g: exported(db, g.module, g.name), lambda g: _faultless(db, g))
@@ -108,17 +106,6 @@ def check_conditions(db: Database, file: str, name: str) -> tuple[Diagnostic, ..
     products = _products(db, elaborated.term, found, spans, fallback)
     maps = _maps(item, chunk_text(db, file, name))
     return (*_judged(found, spans, fallback, maps, lambda g: _whole(db, g)), *products)
-
-
-def _of_unknown_records(db: Database, file: str, name: str) -> bool:
-    """Whether a definition uses a record that is wrong itself: what its guessed fields would lead to is no fault of who
-    uses them."""
-    return any(
-        isinstance(made := result_of(shape(db, used.file, used.name)), TupleOf)
-        and made.record is not None
-        and not is_sound(db, used.file, used.name)
-        for used in dependencies(db, file, name)
-    )
 
 
 def _maps(item: nodes.Definition | None, text: str | None) -> frozenset[Span]:
@@ -145,18 +132,11 @@ def _exported_in_cycle(db: Database, file: str, name: str) -> Term | None:
 def exported(db: Database, file: str, name: str) -> Term | None:
     """The conditions and calls of a definition over its parameters: what a caller's check reads.
 
-    None of one that is wrong itself: what its guessed or ill-typed text would lead to is no fault of its callers.
+    None of one that is wrong itself, or uses one that is guessed: what that would lead to is no fault of its callers.
     """
-    if not is_sound(db, file, name):
+    if not is_sound(db, file, name) or rests_on_guesses(db, file, name):
         return None
     return skeleton(core_term(db, file, name), lambda g: has_conditions(exported(db, g.module, g.name)))
-
-
-@query(travels=True)
-def is_sound(db: Database, file: str, name: str) -> bool:
-    """Whether a definition could be read and has a type."""
-    wrong = any(said.severity == "error" for said in check_definition(db, file, name))
-    return not wrong and not interface(db, file, name).broken
 
 
 def _whole(db: Database, target: Global) -> Term | None:
