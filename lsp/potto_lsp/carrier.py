@@ -99,10 +99,10 @@ class Protocol(JsonRPCProtocol):
             super()._handle_request(msg_id, method_name, params)
 
     def _handle_notification(self, method_name: str, params: Any) -> None:
-        if not self._server.listens(method_name):
-            logger.info("a notification out of time: %s", method_name)
-        elif method_name == "$/cancelRequest":
+        if method_name == "$/cancelRequest":  # also after `shutdown`: what was asked before it is still waited for
             self._handle_cancel_notification(params.get("id") if isinstance(params, Mapping) else None)
+        elif not self._server.listens(method_name):
+            logger.info("a notification out of time: %s", method_name)
         elif method_name in self.fm.features:
             super()._handle_notification(method_name, params)
         elif not method_name.startswith("$/"):

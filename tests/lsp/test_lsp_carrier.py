@@ -98,6 +98,19 @@ def test_what_is_cancelled_is_answered_once(made: tuple[Always, Written]) -> Non
     assert [(m["id"], m["error"]["code"]) for m in written.messages] == [(1, -32800)]
 
 
+def test_what_was_asked_before_the_end_can_be_cancelled_after_it(
+    made: tuple[Always, Written], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As Visual Studio Code does between `shutdown` and `exit`."""
+    server, written = made
+    server.feature("later")(lambda params: Future[Any]())
+    server.protocol.handle_message({"jsonrpc": "2.0", "id": 1, "method": "later"})
+    monkeypatch.setattr(server, "listens", lambda method: False)
+    server.protocol.handle_message({"method": "$/cancelRequest", "params": {"id": 1}})
+    (answer,) = written.messages
+    assert answer["id"] == 1 and answer["error"]["code"] == -32800
+
+
 def test_ids_of_both_sides_are_apart(made: tuple[Always, Written]) -> None:
     """A client that counts as we do is answered, and what it answers counts."""
     server, written = made
