@@ -17,10 +17,14 @@ Polynomial = list[mp.mpf]  # the constant first
 DIGITS = 60
 
 
-def area(conics: Sequence[Conic], t: float, side: float, inside: Inside) -> tuple[mp.mpf, mp.mpf]:
-    """The area of what is inside in [-side, side]^2, and its derivative by t."""
+def area(
+    conics: Sequence[Conic], t: float, side: float, inside: Inside, speeds: Sequence[int] | None = None
+) -> tuple[mp.mpf, mp.mpf]:
+    """The area of what is inside in [-side, side]^2, and its derivative by t. speeds: how many times t each conic is
+    held against, once by default."""
     with mp.workdps(DIGITS):
-        own = [_in_y(conic, mp.mpf(t)) for conic in conics]
+        speeds = speeds or [1] * len(conics)
+        own = [_in_y(conic, speed * mp.mpf(t)) for conic, speed in zip(conics, speeds, strict=True)]
         end = mp.mpf(side)
         bounds: list[list[Polynomial]] = [[[y], [mp.mpf(1)], [mp.mpf(0)]] for y in (end, -end)]
         places = {-end, end}
@@ -31,7 +35,7 @@ def area(conics: Sequence[Conic], t: float, side: float, inside: Inside) -> tupl
         ends = sorted(x for x in places if abs(x) <= end)
         value = slope = mp.mpf(0)
         for low, high in itertools.pairwise(ends):
-            for part, rate in _sections(own, low, high, end, inside):
+            for part, rate in _sections(own, speeds, low, high, end, inside):
                 value, slope = value + part, slope + rate
         return value, slope
 
@@ -52,7 +56,7 @@ def places(first: Conic, second: Conic, side: float = 2.0) -> list[tuple[mp.mpf,
 
 
 def _sections(
-    conics: Sequence[list[Polynomial]], low: mp.mpf, high: mp.mpf, end: mp.mpf, inside: Inside
+    conics: Sequence[list[Polynomial]], speeds: Sequence[int], low: mp.mpf, high: mp.mpf, end: mp.mpf, inside: Inside
 ) -> list[tuple[mp.mpf, mp.mpf]]:
     """What each section between two places adds to the area, and to its derivative."""
     middle, found = (low + high) / 2, []
@@ -78,7 +82,7 @@ def _sections(
             if change:  # below a section it holds where it grows upwards
                 way = change if p + 2 * c * y > 0 else -change
                 whole, speed = _integrals(conics[number], sign, low, high)
-                found.append((way * whole, way * speed))
+                found.append((way * whole, way * speed * speeds[number]))
     return found
 
 
@@ -121,14 +125,38 @@ def _resultant(first: list[Polynomial], second: list[Polynomial]) -> Polynomial:
 
 
 def _real_roots(polynomial: Polynomial) -> list[mp.mpf]:
-    size = max(map(abs, polynomial))
-    found = list(polynomial)
-    while found and abs(found[-1]) <= size * mp.mpf(10) ** (5 - DIGITS):
-        found.pop()
-    if len(found) < 2:
+    simple = _without_multiples(_trimmed(polynomial))
+    if len(simple) < 2:
         return []
-    roots = mp.polyroots(found, maxsteps=400, extraprec=200, error=False, asc=True)
+    roots = mp.polyroots(simple, maxsteps=400, extraprec=200, error=False, asc=True)
     return [mp.re(root) for root in roots if abs(mp.im(root)) < mp.mpf(10) ** (-DIGITS / 3)]
+
+
+def _trimmed(polynomial: Polynomial, size: mp.mpf | None = None) -> Polynomial:
+    """Without leading coefficients that are rounding of what has this size."""
+    least = (size or max(map(abs, polynomial))) * mp.mpf(10) ** (5 - DIGITS)
+    found = list(polynomial)
+    while found and abs(found[-1]) <= least:
+        found.pop()
+    return found
+
+
+def _without_multiples(polynomial: Polynomial) -> Polynomial:
+    """The polynomial with each root once: over what it has in common with its derivative, by Euclid's algorithm."""
+    shared, rest = polynomial, [k * c for k, c in enumerate(polynomial)][1:]
+    while rest:
+        size = max(map(abs, rest))
+        shared, rest = [c / size for c in rest], _divided(shared, [c / size for c in rest])[1]
+    return _divided(polynomial, shared)[0] if len(shared) > 1 else polynomial
+
+
+def _divided(p: Polynomial, q: Polynomial) -> tuple[Polynomial, Polynomial]:
+    """The quotient and the remainder."""
+    rest, quotient = list(p), list[mp.mpf]()
+    while len(rest) >= len(q):
+        quotient.append(rest[-1] / q[-1])
+        rest = [a - quotient[-1] * b for a, b in zip(rest, [mp.mpf(0)] * (len(rest) - len(q)) + q, strict=True)][:-1]
+    return quotient[::-1], _trimmed(rest, max(map(abs, p)))
 
 
 def _times(p: Polynomial, q: Polynomial) -> Polynomial:

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import potto
-from potto.integrate.decomposition import critical_places
+from potto.integrate.decomposition import box_search
 
 Between = Callable[[Any, Any], Any]  # the probability between two places
 
@@ -166,8 +166,8 @@ def test_an_arm_with_noise_in_both_joints() -> None:
 
 def test_bars_hold_where_the_ends_of_sections_are_not_found(monkeypatch: pytest.MonkeyPatch) -> None:
     """A piece all of whose nodes lie beyond the end of a section does not see it, but its neighbour does."""
-    monkeypatch.setattr(critical_places, "BOXES", 1)
-    monkeypatch.setattr(critical_places, "BOXES_EACH", 1)
+    monkeypatch.setattr(box_search, "BOXES", 1)
+    monkeypatch.setattr(box_search, "BOXES_EACH", 1)
     f = potto.compile(ARM).f
     with mp.workdps(20):
         exact = reach(mp.mpf(0.1), mp.mpf(1.5), mp.mpf(0.3))

@@ -13,6 +13,7 @@ from conic_areas import Conic, Inside, area, places
 import potto
 from potto.integrate.decomposition.balls import exact
 from potto.integrate.decomposition.conic_crossings import crossings
+from potto.integrate.decomposition.quartics import roots_in_discs
 
 KINDS = ("ellipse", "hyperbola", "parabola", "upright parabola", "circle", "line")
 
@@ -88,6 +89,38 @@ def test_conics_that_touch(inside: str, value: mp.mpf, slope: mp.mpf) -> None:
     assert abs(answer.tangent - slope) <= answer.tangent_error + 1e-14 <= 1e-10
 
 
+PARABOLA, ELLIPSE, LONG = (1.0, 0.0, 0.0, 0.0, -1.0, 0.0), (1.0, 0.0, 4.0, 0.0, 0.0, -5.0), (0.25, 0.0, 1.0, 0, 0, -1.0)
+# Each two meet three times in one place, or four times, for t = 0: the second one is the first with a multiple of the
+# square of its tangent added, or of the tangent's product with another line through that place.
+OSCULATING = {
+    "parabola and circle of curvature": (PARABOLA, (1.0, 0.0, 1.0, 1.0, -2.5, -0.1875)),
+    "parabola and circle at its vertex": (PARABOLA, (1.0, 0.0, 1.0, 0.0, -1.0, 0.0)),
+    "ellipse and circle at its vertex": (LONG, (1.0, 0.0, 1.0, -3.0, 0.0, 2.0)),
+    "ellipses, three times": (ELLIPSE, (1.25, 0.75, 3.0, -1.25, 1.25, -5.0)),
+    "ellipses, three times, once beside": (ELLIPSE, (1.25, 1.25, 5.0, -1.75, -3.25, -2.5)),
+    "ellipses, four times": (ELLIPSE, (1.125, 1.0, 6.0, -1.25, -5.0, -1.875)),
+}
+
+
+@pytest.mark.parametrize("speeds", [(1, 0), (0, 1), pytest.param((1, 1), marks=pytest.mark.slow)])
+@pytest.mark.parametrize("name", OSCULATING)
+def test_conics_that_osculate(name: str, speeds: tuple[int, int]) -> None:
+    """At contact and beside it. Rounding of the surfaces hides where they cross for 1e-5 about a place in which they
+    meet three times, for 1e-3 where four times: the slope is known to so much, of the value nothing is lost."""
+    conics = OSCULATING[name]
+    terms = [
+        f"[{a!r}*x*x + {b!r}*x*y + {c!r}*y*y + {d!r}*x + {e!r}*y + {f!r} < {speed}*t]"
+        for (a, b, c, d, e, f), speed in zip(conics, speeds, strict=True)
+    ]
+    f = potto.deriv(potto.compile(f"def f(t) integral ([-4, 4], [-4, 4]) {'*'.join(terms)} d(x, y)").f)
+    for t in (0.0, 1e-3, -1e-3, 1e-6, -1e-6, 1e-9, -1e-9):
+        answer = f((t, 1.0))
+        value, slope = area(conics, t, 4.0, all, speeds)
+        assert abs(answer.value - value) <= answer.error + 1e-14
+        assert abs(answer.tangent - slope) <= answer.tangent_error + 1e-13
+        assert answer.error <= 1e-4 and answer.tangent_error <= 1e-2
+
+
 @pytest.mark.parametrize("apart", [1e-3, 1e-6, 1e-9, 1e-12])
 def test_conics_that_all_but_coincide(apart: float) -> None:
     """The inner one of two ellipses is the moving one where y*y + x*y < 0, or y is between 0 and -x: the slope is twice
@@ -115,3 +148,14 @@ def test_no_crossing_is_missed(seed: int) -> None:
         for x, y in theirs:
             assert any(max(abs(x - at[0]), abs(y - at[1])) <= off <= 1e-8 for at, off in mine)
         assert len([at for at, _ in mine if np.abs(at).max() <= 2]) == len(theirs)
+
+
+@pytest.mark.parametrize("often", [2, 3, 4])
+def test_discs_around_a_root_that_is_there_several_times(often: int) -> None:
+    """Their radius is about the root of what doubles are rounded by, (16*2^-52)^(1/often), whatever approximations
+    they are made of: 20 times that are the sizes of the summands and the other roots."""
+    roots = [1.0] * often + [-2.0] * (4 - often)
+    discs = roots_in_discs(exact(np.poly(roots)[::-1, None]))
+    near = np.abs(discs.middle[:, 0] - 1) <= discs.radius[:, 0]
+    assert near.sum() == often and (discs.together[near].sum(axis=1) == often).all()
+    assert discs.radius[near, 0].max() <= 20 * (16 * 2.0**-52) ** (1 / often)

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 import potto
-from potto.integrate.decomposition import critical_places
+from potto.integrate.decomposition import box_search, critical_places
 
 CUBE = "def f(t) integral ([-2, 2], [-2, 2], [-2, 2]) {} d(x, y, z)"
 
@@ -64,7 +64,7 @@ def _shared(count: int) -> tuple[Any, int]:
         [0.1 + (a * u + b * v) / 3 for u, v in zip((2, 1, 2), (-2, 2, 1), strict=True)] for a, b in PLANE[:count]
     ]
     balls = " and ".join(f"(x - {a!r})^2 + (y - {b!r})^2 + (z - {c!r})^2 < t^2" for a, b, c in middles)
-    most, own, solved = 0, 0, critical_places._Search.solved
+    most, own, solved = 0, 0, box_search.Search.solved
 
     def counted(*given: Any) -> Any:
         nonlocal own
@@ -81,6 +81,6 @@ def _shared(count: int) -> tuple[Any, int]:
         return found
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(critical_places._Search, "solved", counted)
+        patch.setattr(box_search.Search, "solved", counted)
         patch.setattr("potto.integrate.adaptive.iterated.critical_rows", asked)
         return potto.grad(potto.compile(CUBE.format(f"[{balls}]")).f)(0.95), most

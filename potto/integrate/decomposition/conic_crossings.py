@@ -5,7 +5,8 @@ circles, a member of it is a line, and what is left is a quadratic equation. Els
 resultant of degree 4, in coordinates turned in projective space, so that neither axes nor points at infinity are
 special; discs hold all of its roots, so that none is missed (`quartics`). Newton's method finds the places, and
 Kantorovich's theorem proves them (Ortega 1968), whose constants are exact for conics. Where fewer are proved than may
-be, since conics touch or all but coincide, the discs that are left tell where others may be.
+be, since conics touch or all but coincide, the discs that are left tell where others may be: just one where a disc
+holds a single root.
 """
 
 from __future__ import annotations
@@ -134,7 +135,7 @@ def _on_lines(m: Ball, n: Ball, box: Array) -> Crossings:
         far = u.v**2 + v.v**2  # of the squares there it is not known what they come to
         far = np.where(np.isfinite(far), far, 0.0)
         u, v = _along(m, a, b, c + Ball(np.zeros_like(far), size * far))[which]
-        parts.append(_places(np.arange(far.size), u, v, True))
+        parts.append(_places(np.arange(far.size), u, v, np.ones(far.shape, dtype=bool)))
     return joined(parts)
 
 
@@ -170,18 +171,17 @@ def _of_conics(p: Ball, q: Ball, box: Array) -> Crossings:
         done = ~search.open.any(axis=0) | last
         which, at = np.nonzero(search.proved & done)
         u, v = (Ball(of[which, at], search.radius[which, at]) for of in search.places)
-        parts.append(_places(left[at], *_turned_back(u, v, turn), True))
-        for u, v, at in search.others(turn, box[:, left]) if last else ():
-            parts.append(_places(left[at], *_turned_back(u, v, turn), False))
+        parts.append(_places(left[at], *_turned_back(u, v, turn), np.ones(at.shape, dtype=bool)))
+        for at, u, v, sure in search.others(turn, box[:, left]) if last else ():
+            parts.append(_places(left[at], *_turned_back(u, v, turn), sure))
         left = left[~done]
         if not left.size:
             break
     return joined(parts)
 
 
-def _places(pair: Ints, x: Ball, y: Ball, sure: bool) -> Crossings:
-    off = np.maximum(x.e, y.e)
-    return Crossings(pair, np.stack((x.v, y.v)), off, np.full(pair.shape, sure))
+def _places(pair: Ints, x: Ball, y: Ball, sure: Bools) -> Crossings:
+    return Crossings(pair, np.stack((x.v, y.v)), np.maximum(x.e, y.e), sure)
 
 
 def _turned_back(u: Ball, v: Ball, turn: Array) -> tuple[Ball, Ball]:
@@ -237,21 +237,24 @@ class _Search:
         found: Bools = discs.real & (among.sum(axis=1) < discs.together.sum(axis=1))
         return found
 
-    def others(self, turn: Array, box: Array) -> list[tuple[Ball, Ball, Ints]]:
-        """Where further crossings may be, of which pairs, but for what is outside of boxes (4, N)."""
+    def others(self, turn: Array, box: Array) -> list[tuple[Ints, Ball, Ball, Bools]]:
+        """Where further crossings may be, of which pairs, but for what is outside of boxes (4, N); and whether there
+        is just one: at a simple root, that is real since its conjugate would be in its disc as well."""
         first = self.open & ~(self.discs.together & np.tri(4, k=-1, dtype=bool)[:, :, None]).any(axis=1)
         which, at = np.nonzero(first)  # of discs that hang together
         u = self.discs.united(which, at)
         m, n = self.p[:, :, at], self.q[:, :, at]
         half = m[1, 2] + m[0, 1] * u
         root = (half * half - m[1, 1] * (m[2, 2] + (m[0, 2] * u).times(2.0) + m[0, 0] * u * u)).root()
+        whole, slope = (_at(part, u) for part in _shared(m, n))
+        alone = -whole / slope
+        simple = np.isfinite(alone.e) & (self.discs.together[which, :, at].sum(axis=1) == 1)
         found = []
-        for sign in (1.0, -1.0):
-            v = (root.times(sign) - half) / m[1, 1]
+        for v, some in ((alone, simple), *(((root.times(sign) - half) / m[1, 1], ~simple) for sign in (1.0, -1.0))):
             place = [u, v, exact(np.ones_like(u.v))]
-            there = ~np.isnan(v.v) & _form(n, place, place).may_vanish()
-            there &= ~_beyond(_homogeneous(u, v, turn), box[:, at])
-            found.append((u[there], v[there], at[there]))
+            there = some & ~np.isnan(v.v) & ~(np.abs(v.v - alone.v) > v.e + alone.e)
+            there &= _form(n, place, place).may_vanish() & ~_beyond(_homogeneous(u, v, turn), box[:, at])
+            found.append((at[there], u[there], v[there], simple[there]))
         return found
 
 
@@ -290,12 +293,28 @@ def _values(m: Array, places: Array) -> tuple[Array, Array, Array]:
 
 def _resultant(p: Ball, q: Ball) -> Ball:
     """The polynomial in u, (5, N), that is 0 where two conics meet (Bezout's form)."""
-    (p0, p1, p2), (q0, q1, q2) = (
-        ([m[2, 2], m[0, 2].times(2.0), m[0, 0]], [m[1, 2].times(2.0), m[0, 1].times(2.0)], [m[1, 1]]) for m in (p, q)
-    )
-    a, b, c = (_less(_product(s, t), _product(x, y)) for s, t, x, y in
-               ((p2, q0, q2, p0), (p2, q1, q2, p1), (p1, q0, q1, p0)))  # fmt: skip
-    return stacked(_less(_product(a, a), _product(b, c)))
+    (p0, p1, _), (q0, q1, _) = _in_v(p), _in_v(q)
+    a, b = _shared(p, q)
+    return stacked(_less(_product(a, a), _product(b, _less(_product(p1, q0), _product(q1, p0)))))
+
+
+def _shared(p: Ball, q: Ball) -> tuple[list[Ball], list[Ball]]:
+    """Polynomials a and b in u with a + b*v = 0 where two conics meet: the line of their pencil through that place."""
+    (p0, p1, p2), (q0, q1, q2) = _in_v(p), _in_v(q)
+    return _less(_product(p2, q0), _product(q2, p0)), _less(_product(p2, q1), _product(q2, p1))
+
+
+def _in_v(m: Ball) -> tuple[list[Ball], list[Ball], list[Ball]]:
+    """The coefficients of 1, v and v*v of a conic with matrix m, as polynomials in u."""
+    return [m[2, 2], m[0, 2].times(2.0), m[0, 0]], [m[1, 2].times(2.0), m[0, 1].times(2.0)], [m[1, 1]]
+
+
+def _at(p: Sequence[Ball], u: Ball) -> Ball:
+    """The value of a polynomial."""
+    found = p[-1]
+    for coefficient in reversed(p[:-1]):
+        found = found * u + coefficient
+    return found
 
 
 def _product(p: Sequence[Ball], q: Sequence[Ball]) -> list[Ball]:

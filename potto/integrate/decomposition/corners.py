@@ -15,11 +15,11 @@ import numpy as np
 from msgspec import Struct
 from msgspec.structs import replace
 
-from potto.calculus.decomposition.critical import Critical
-from potto.core.terms import Lam, Term, children
+from potto.calculus.decomposition.critical import Critical, Within
+from potto.core.terms import Lam, Term, children, var
 from potto.integrate.columns import distinct, side_by_side
 from potto.integrate.decomposition.conic_corners import BESIDE, CLEAR, Places, conic_corners, mixed_corners, moving
-from potto.integrate.decomposition.critical_places import critical_rows
+from potto.integrate.decomposition.critical_places import common_places
 from potto.integrate.decomposition.meetings import Row, as_array, tangents
 from potto.integrate.events import Unsearched
 from potto.integrate.levels import Corners, LevelPlan
@@ -30,7 +30,9 @@ from potto.kernels.cells import Array, Cell, Ints, Value
 ROUNDED = 2 * EPS  # of the sizes of its summands: how far off a sum of products is
 FINEST = 4 * EPS**2  # the same with what rounding took from each product
 SPLITS = 2.0**27 + 1
-NEAR = 1e-3  # of the size of its place: what is not known to that of a corner is not known at all
+MOST_COMMON = 4  # places that two conics have in common
+AROUND = "corner low", "corner high"  # names of the bounds of a search for places beside one
+NEAR = 0.25  # of the size of its place: what is not known to that of a corner is not known at all
 MOST_NUMBERS = 1 << 18  # that are clipped at once
 
 
@@ -136,12 +138,17 @@ def _touching(
     for pair in distinct(places.p * len(surfaces) + places.q):
         p, q = divmod(int(pair), len(surfaces))
         here = places.pick((places.p == p) & (places.q == q))
-        low, high = (Cell(here.place[0] + sign * here.off) for sign in (-1.0, 1.0))
-        system = Critical((surfaces[p], surfaces[q]), (region.within,))
-        for row in critical_rows([system], variable, gather(env, here.owner), low, high, {}, here.owner.size, machine):
-            order = np.argsort(here.owner, kind="stable")
-            found = side_by_side(here.owner[order], np.stack((row.x, row.e))[:, order], batch)
-            rows += [Row(x, (), row.cut, False, e) for x, e in zip(*found, strict=True)]
+        low, high = (here.place + sign * here.off for sign in (-1.0, 1.0))
+        around = {
+            **gather(env, here.owner),
+            **{name: Cell(of[1]) for name, of in zip(AROUND, (low, high), strict=True)},
+        }
+        system = Critical((surfaces[p], surfaces[q]), (Within(region.within.variable, *map(var, AROUND)),))
+        found = common_places(system, variable, around, (low[0], high[0]), MOST_COMMON, machine)
+        order = np.argsort(here.owner, kind="stable")
+        for x, e in zip(*found, strict=True):
+            placed = side_by_side(here.owner[order], np.stack((x, e))[:, order], batch)
+            rows += [Row(x, (), -1, False, e) for x, e in zip(*placed, strict=True) if np.isfinite(x).any()]
     return rows
 
 

@@ -44,22 +44,70 @@ class RootDiscs(Struct, frozen=True):
 
 def roots_in_discs(polynomial: Ball) -> RootDiscs:
     """Discs around the roots of polynomials (n + 1, N), the constants first."""
-    v, e = polynomial.v, polynomial.e
+    v = polynomial.v
     n = v.shape[0] - 1
     known = np.isfinite(v / v[-1]).all(axis=0)
     companions = np.zeros((v.shape[1], n, n))
     companions[:, range(1, n), range(n - 1)] = 1.0
     companions[known, :, -1] = (-v[:-1] / v[-1]).T[known]
-    middle: Any = np.linalg.eigvals(companions).T.astype(complex)
-    value, size, off = (np.zeros(middle.shape, of) for of in (complex, float, float))
-    for k in reversed(range(n + 1)):
-        value, size, off = value * middle + v[k], size * np.abs(middle) + np.abs(v[k]), off * np.abs(middle) + e[k]
+    middle = np.linalg.eigvals(companions).T.astype(complex)
+    radius, together = _discs(polynomial, middle, known)
+    close = np.nonzero(known & (together.sum(axis=(0, 1)) > n))[0]
+    if close.size:
+        some = polynomial[:, close]
+        middle[:, close] = _spread(some, middle[:, close])
+        radius[:, close], together[:, :, close] = _discs(some, middle[:, close], known[close])
+    return RootDiscs(middle, radius, together)
+
+
+def _discs(polynomial: Ball, middle: Array, known: Bools) -> tuple[Array, Bools]:
+    """The radii (n, N) of discs around approximations, and which of them hang together."""
+    n, lead = middle.shape[0], polynomial[-1]
     apart = middle[:, None] - middle[None]
-    apart[range(n), range(n)] = np.abs(v[-1]) - e[-1]
-    least = np.abs(apart.prod(axis=1))
-    radius = n * (np.abs(value) + off + ROUNDED * size) / least
-    radius = np.where(known & (np.abs(v[-1]) > e[-1]) & np.isfinite(radius), radius, np.inf)
-    together = ~(np.abs(middle[:, None] - middle[None]) > radius[:, None] + radius[None])
+    apart[range(n), range(n)] = np.abs(lead.v) - lead.e
+    largest = np.abs(_value(polynomial, middle)) + _rounding(polynomial, middle)
+    radius = n * largest / np.abs(apart.prod(axis=1))
+    radius = np.where(known & (np.abs(lead.v) > lead.e) & np.isfinite(radius), radius, np.inf)
+    gap = np.abs(middle[:, None] - middle[None])
+    together: Any = ~(gap > radius[:, None] + radius[None])
     for _ in range(n.bit_length() - 1):  # what hangs together with what hangs together
         together = (together[:, :, None] & together[None]).any(axis=1)
-    return RootDiscs(middle, radius, together)
+    return radius, together
+
+
+def _spread(polynomial: Ball, middle: Array) -> Array:
+    """Approximations (n, N), those that rounding does not tell from a multiple root spread on a circle about their mean
+    as large as that leaves in doubt: Smith's discs grow without bound as approximations come closer than that."""
+    n, batch = middle.shape
+    done, at = np.zeros((n, batch), dtype=bool), np.arange(batch)
+    lead = np.abs(polynomial.v[-1])
+    for k in range(n, 1, -1):
+        for i in range(n):
+            gap = np.abs(middle - middle[i])
+            order = np.argsort(gap, axis=0, kind="stable")
+            own, others = order[:k], order[k:]
+            mean = middle[own, at].mean(axis=0)
+            beside = np.abs(mean - middle[others, at]).prod(axis=0)
+            reach = (_rounding(polynomial, mean[None])[0] / (lead * beside)) ** (1 / k)
+            wide = np.abs(middle[own, at] - mean).max(axis=0)
+            some = np.nonzero((wide <= reach) & np.isfinite(reach) & ~done[own, at].any(axis=0))[0]
+            angles = np.exp(1j * np.pi * (2 * np.arange(k) + 1) / k)[:, None]
+            middle[own[:, some], some] = mean[some] + reach[some] * angles
+            done[own[:, some], some] = True
+    return middle
+
+
+def _value(polynomial: Ball, places: Array) -> Array:
+    """Polynomials at places (P, N)."""
+    found = np.zeros(places.shape, dtype=complex)
+    for v in polynomial.v[::-1]:
+        found = found * places + v
+    return found
+
+
+def _rounding(polynomial: Ball, places: Array) -> Array:
+    """How far off those are: by rounding, and by the radii of the coefficients."""
+    size, far = np.zeros(places.shape), np.abs(places)
+    for v, e in zip(polynomial.v[::-1], polynomial.e[::-1], strict=True):
+        size = size * far + ROUNDED * np.abs(v) + e
+    return size
