@@ -108,17 +108,37 @@ def test_conics_that_osculate(name: str, speeds: tuple[int, int]) -> None:
     """At contact and beside it. Rounding of the surfaces hides where they cross for 1e-5 about a place in which they
     meet three times, for 1e-3 where four times: the slope is known to so much, of the value nothing is lost."""
     conics = OSCULATING[name]
-    terms = [
-        f"[{a!r}*x*x + {b!r}*x*y + {c!r}*y*y + {d!r}*x + {e!r}*y + {f!r} < {speed}*t]"
-        for (a, b, c, d, e, f), speed in zip(conics, speeds, strict=True)
-    ]
-    f = potto.deriv(potto.compile(f"def f(t) integral ([-4, 4], [-4, 4]) {'*'.join(terms)} d(x, y)").f)
+    one, other = (f"[{written(conic)[:-1]}{speed}*t]" for conic, speed in zip(conics, speeds, strict=True))
+    f = potto.deriv(potto.compile(f"def f(t) integral ([-4, 4], [-4, 4]) {one}*{other} d(x, y)").f)
     for t in (0.0, 1e-3, -1e-3, 1e-6, -1e-6, 1e-9, -1e-9):
         answer = f((t, 1.0))
         value, slope = area(conics, t, 4.0, all, speeds)
         assert abs(answer.value - value) <= answer.error + 1e-14
         assert abs(answer.tangent - slope) <= answer.tangent_error + 1e-13
         assert answer.error <= 1e-4 and answer.tangent_error <= 1e-2
+
+
+# Two ellipses, a circle, a parabola, a hyperbola and a line through the origin.
+THROUGH_ONE: list[Conic] = [
+    (0.25, 0.0, 1.0, 0.0, -2.0, 0.0), (1.0, 0.0, 0.5, -2.0, 0.0, 0.0), (1.0, 0.0, 1.0, -1.0, -1.0, 0.0),
+    (1.0, 0.0, 0.0, 0.5, -1.0, 0.0), (1.0, 0.0, -1.0, 1.0, 0.5, 0.0), (0.0, 0.0, 0.0, 1.0, -1.0, 0.0),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("which", "speeds", "word"), [
+    ((0, 1, 2), (1, 1, 0), "and"), ((0, 1, 2, 3, 4), (1, 0, 1, 0, 0), "and"), ((0, 1, 2, 3, 4), (1, 0, 1, 0, 0), "or"),
+    ((0, 1, 3, 5), (0, 1, 0, 1), "and"), ((0, 3, 4), (1, 1, 1), "and"),
+])  # fmt: skip
+def test_many_conics_through_one_place(which: tuple[int, ...], speeds: tuple[int, ...], word: str) -> None:
+    """As they pass through it, and beside: 1e-14, 1e-13 are what doubles are rounded by."""
+    conics = [THROUGH_ONE[i] for i in which]
+    terms = [written(conic)[:-1] + f"{speed}*t" for conic, speed in zip(conics, speeds, strict=True)]
+    f = potto.deriv(potto.compile(f"def f(t) integral ([-4, 4], [-4, 4]) [{f' {word} '.join(terms)}] d(x, y)").f)
+    for t in (0.0, 1e-6, -1e-6, 1e-9, -1e-9):
+        answer = f((t, 1.0))
+        value, slope = area(conics, t, 4.0, all if word == "and" else any, speeds)
+        assert abs(answer.value - value) <= answer.error + 1e-14 <= 1e-9
+        assert abs(answer.tangent - slope) <= answer.tangent_error + 1e-13 <= 1e-8
 
 
 @pytest.mark.parametrize("apart", [1e-3, 1e-6, 1e-9, 1e-12])
