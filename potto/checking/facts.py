@@ -15,18 +15,16 @@ from potto.calculus.checking.conditions import conditions_of
 from potto.calculus.checking.diffeo import exported
 from potto.calculus.decomposition.guards import unguarded
 from potto.calculus.explanation.bound_names import as_written
-from potto.calculus.explanation.explain import describe, equation
+from potto.calculus.explanation.explain import describe
 from potto.calculus.explanation.fields import fields_of
-from potto.calculus.explanation.fractions import as_the_program_writes
 from potto.calculus.explanation.layout import WIDTH, DerivativeText, IntegralText, Show, meets
-from potto.calculus.explanation.symbols import Rewrite
+from potto.calculus.explanation.notation import Notation, numbers_of
 from potto.calculus.inlining.expand import expanded
 from potto.calculus.surfaces.branch_cuts import opened
-from potto.core.printer import format_term
 from potto.core.simplify import normalized_surface, simplify
-from potto.core.terms import App, Branch, Const, Delta, Deriv, Global, Integral, Lam, Term, postorder
+from potto.core.terms import App, Branch, Const, Delta, Deriv, Global, Integral, Lam, Term, global_, postorder
 from potto.elaborate import core, elaborate_expression
-from potto.modules import definition, is_recursive
+from potto.modules import is_recursive
 from potto.query import Database
 from potto.syntax import nodes
 from potto.syntax.typesetting import broken, unicode
@@ -125,10 +123,11 @@ def _part(word: str, texts: tuple[str, ...]) -> list[str]:
 
 def surfaces(db: Database, file: str, expr: nodes.Expr) -> tuple[str, ...]:
     """Where the value or the integrand of an expression jumps: `x + y + c = 0`, each once."""
-    return tuple(_surfaces(db, elaborate_expression(db, file, expr).term, lambda term: term))
+    term = elaborate_expression(db, file, expr).term
+    return tuple(_surfaces(db, term, Notation(numbers=numbers_of(db, term, expr))))
 
 
-def _surfaces(db: Database, term: Term, fields: Rewrite) -> dict[str, None]:
+def _surfaces(db: Database, term: Term, notation: Notation) -> dict[str, None]:
     while isinstance(term, Deriv | Global):  # another name for it, or its derivative, has the same ones
         term = term.function if isinstance(term, Deriv) else core(db, term.module, term.name).term
     found = conditions_of(term, lambda g: exported(db, g.module, g.name), lambda g: core(db, g.module, g.name).term)
@@ -142,16 +141,16 @@ def _surfaces(db: Database, term: Term, fields: Rewrite) -> dict[str, None]:
     crossed = (surface for surface in each.values() if not isinstance(surface, Const))
     over = {name for node in postorder(term) if isinstance(node, Integral) for name in node.variables}
     over.update(name for condition in found for name in condition.variables)
-    return dict.fromkeys(_COPY.sub("", equation(fields(surface), over)) for surface in crossed)
+    return dict.fromkeys(_COPY.sub("", notation.equation(notation.fields(surface), over)) for surface in crossed)
 
 
 def derivative_facts(db: Database, file: str, name: str) -> DerivativeFacts | None:
     """The derivative of a definition in symbols; None for one that is not a function."""
-    at, whole = (file, name), core(db, file, name).term
+    whole = core(db, file, name).term
     term, type = whole, interface(db, file, name).type
     while isinstance(term, Deriv | Global):
         if isinstance(term, Global):
-            at, type = (term.module, term.name), interface(db, term.module, term.name).type
+            type = interface(db, term.module, term.name).type
             term = core(db, term.module, term.name).term
         else:
             term = term.function
@@ -159,23 +158,22 @@ def derivative_facts(db: Database, file: str, name: str) -> DerivativeFacts | No
         return None
     if not is_recursive(db, file, name):
         term = expanded(term, lambda g: _unless_recursive(db, g))
-    fields = fields_of(db, type)
+    notation = Notation(fields_of(db, type), numbers_of(db, global_(file, name)))
     type = interface(db, file, name).type
     derived = format_type(derivative_type(type))
-    found = describe(term, name, derived, lambda g: core(db, g.module, g.name).term, fields)
-    facts = DerivativeFacts(
+    found = describe(term, name, derived, lambda g: core(db, g.module, g.name).term, notation)
+    return DerivativeFacts(
         name,
         format_type(type),
         derived,
-        tuple(_surfaces(db, whole, fields)),
+        tuple(_surfaces(db, whole, notation)),
         tuple(map(_integral_facts, found.integrals)),
-        None if found.alone else _body_facts(term, found, fields),
+        None if found.alone else _body_facts(term, found, notation),
         found.tangent,
         found.conditions,
         tuple(sorted(found.tangents)),
         found.divisors,
     )
-    return as_the_program_writes(facts, definition(db, *at))
 
 
 def _unless_recursive(db: Database, target: Global) -> Term | None:
@@ -189,10 +187,10 @@ def _integral_facts(found: IntegralText) -> PartFacts:
                      found.bounds, reason, found.continuous, found.each)  # fmt: skip
 
 
-def _body_facts(term: Term, found: DerivativeText, fields: Rewrite) -> PartFacts:
+def _body_facts(term: Term, found: DerivativeText, notation: Notation) -> PartFacts:
     """A body that is not an integral by itself; what it is around its integrals is seen in the whole derivative."""
     while isinstance(term, Lam):
         term = term.body
     interior = "" if found.integrals else found.smooth
-    value = format_term(fields(as_written(unguarded(term)[0])))
+    value = notation.text(notation.fields(as_written(unguarded(term)[0])))
     return PartFacts(value, interior, found.deltas, (), "; ".join(found.problems), found.continuous)

@@ -13,7 +13,7 @@ from msgspec import Struct
 
 from potto.calculus.differentiation.boundary_terms import jumps
 from potto.calculus.differentiation.dual import Differentiator
-from potto.calculus.explanation.explain import equation
+from potto.calculus.explanation.notation import Notation
 from potto.calculus.explanation.plain_names import apart, plainly_named
 from potto.calculus.solving.pivots import Roots
 from potto.checking.written_out import carried_out
@@ -87,9 +87,9 @@ class DrawnIntegral(Struct, frozen=True):
     surfaces: tuple[RegionSurface, ...]
 
 
-def regions(db: Database, term: Term, wrt: str) -> tuple[DrawnIntegral, ...]:
+def regions(db: Database, term: Term, wrt: str, notation: Notation) -> tuple[DrawnIntegral, ...]:
     """The outermost integrals of a function, in order; `wrt` is the parameter that moves. Of one that is a tuple there
-    is a region for each number.
+    is a region for each number; surfaces are told in the `notation`.
 
     One in a sum or an array is a region for each choice of its `indices`. What depends on the state of a fold is left
     out. Raises PottoError where an integrand has no derivative in symbols.
@@ -97,7 +97,7 @@ def regions(db: Database, term: Term, wrt: str) -> tuple[DrawnIntegral, ...]:
     params, found, around = _outermost(db, term)
     work = Differentiator(lambda g: core(db, g.module, g.name).term, wanted=Roots.ALL)
     names = (*params, *(index.name for index in around))
-    return tuple(_region(part, names, work, wrt) for node in found for part in _numbers(node))
+    return tuple(_region(part, names, work, wrt, notation) for node in found for part in _numbers(node))
 
 
 def indices(db: Database, term: Term) -> tuple[OuterIndex, ...]:
@@ -164,7 +164,9 @@ def _part(term: Term, place: int) -> Term:
     return proj(term, place)
 
 
-def _region(node: Integral, params: tuple[str, ...], work: Differentiator, wrt: str) -> DrawnIntegral:
+def _region(
+    node: Integral, params: tuple[str, ...], work: Differentiator, wrt: str, notation: Notation
+) -> DrawnIntegral:
     node = plainly_named(node, params)
     names = (*params, *node.variables)
 
@@ -175,7 +177,7 @@ def _region(node: Integral, params: tuple[str, ...], work: Differentiator, wrt: 
         return work.dual(term, {name: ONE})[1]
 
     def surface(level: Term, jump: Lam | None) -> RegionSurface:
-        where = _COPY.sub("", equation(simplify(level), node.variables))
+        where = _COPY.sub("", notation.equation(simplify(level), node.variables))
         slopes = tuple(over(along(level, name)) for name in node.variables)
         return RegionSurface(where, over(level), over(along(level, wrt)), slopes, jump)
 

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from potto.calculus.differentiation.higher_order import NoText, first_derivative
 from potto.calculus.explanation.explain import describe, explain_derivative
-from potto.calculus.explanation.fractions import as_the_program_writes
 from potto.calculus.explanation.layout import DerivativeText, IntegralText
+from potto.calculus.explanation.notation import Notation, numbers_of
 from potto.checking.facts import LONG
 from potto.core.terms import Deriv, Global, Term
 from potto.elaborate import core_term, elaborate_expression
@@ -54,7 +54,8 @@ def function_derivative(db: Database, file: str, expr: nodes.Expr, name: str) ->
         return core_term(db, target.module, target.name)
 
     try:
-        return as_the_program_writes(describe(first_derivative(found.term, term_of), name, type, term_of), expr)
+        notation = Notation(numbers=numbers_of(db, found.term, expr))
+        return describe(first_derivative(found.term, term_of), name, type, term_of, notation)
     except NoText as problem:
         return DerivativeText(name, type, "", False, (), (str(problem),))
 

@@ -6,13 +6,14 @@ between 1 and 0 is an Iverson bracket, its surface turned so that it reads as a 
 
 from __future__ import annotations
 
-import math
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 
 from msgspec import Struct
 
 from potto.core.consing import Base, short_text
+from potto.core.copies import names_of_copies, renamed
+from potto.core.numerals import Numbers, decimal, numeral
 from potto.core.terms import (
     ONE,
     ZERO,
@@ -38,22 +39,14 @@ from potto.core.terms import (
     Term,
     Tuple,
     Var,
-    array,
-    children,
-    fold,
-    integral,
-    lam,
     postorder,
-    rebuild,
-    sum_,
-    var,
 )
 
 # How tightly a text holds together; an operand looser than its place needs parentheses.
 _OPEN, _OR, _AND, _NOT, _COMPARE, _ADD, _SIGN, _MUL, _POW, _ATOM = range(10)
 _COMPARISONS = {"lt": "<", "le": "<=", "eq": "==", "ne": "!="}
 _LOGIC = {"and": _AND, "or": _OR}
-_NUMBER = re.compile(r"-?[\d.]+(e[-+]?\d+)?")
+_NUMBER = re.compile(r"-?[\d.]+(e[-+]?\d+)?(/\d+)?")
 _NAME = re.compile(r"[^\W\d][\w.]*")  # or a part of what has one
 _LIKE_A_HEAD = re.compile(r"[^\W\d][\w']*\.\d")  # `c.2`, which begins a function of c where a function's head ends
 
@@ -89,15 +82,15 @@ def shortened(text: str) -> str:
     return f"{text[: LONGEST // 2]} … {text[-LONGEST // 3 :]} ({len(text):,} characters)"
 
 
-def format_term(term: Term, limit: int = _LIMIT) -> str:
+def format_term(term: Term, limit: int = _LIMIT, numbers: Numbers = Numbers.STORED) -> str:
     """A term as Potto source on one line. Parts longer than `limit` characters are `LEFT_OUT`.
 
     Copies of bound variables, which have names that nobody can write (`k'1`), get names that one can (`k1`).
     """
-    return _texts(term, limit)[term].text
+    return _texts(term, limit, numbers)[term].text
 
 
-def format_equation(surface: Term, variables: Iterable[str] = ()) -> str:
+def format_equation(surface: Term, variables: Iterable[str] = (), numbers: Numbers = Numbers.STORED) -> str:
     """Where a surface is 0, as people write it, whatever its sign: `x = t` for t - x.
 
     A name that stands alone comes first, of two one of the `variables`; else what is longer, and a number last.
@@ -107,7 +100,7 @@ def format_equation(surface: Term, variables: Iterable[str] = ()) -> str:
             surface = inner
         case _:
             pass
-    less, more, _ = _sides(surface, _texts(surface, _LIMIT))
+    less, more, _ = _sides(surface, _texts(surface, _LIMIT, numbers))
 
     def place(side: str) -> tuple[bool, bool, bool, int]:
         alone = _NAME.fullmatch(side) is not None
@@ -116,12 +109,12 @@ def format_equation(surface: Term, variables: Iterable[str] = ()) -> str:
     return " = ".join(sorted(sorted((less, more), reverse=True), key=place))
 
 
-def _texts(term: Term, limit: int) -> _Texts:
+def _texts(term: Term, limit: int, numbers: Numbers) -> _Texts:
     texts: _Texts = {}
     nodes = tuple(postorder(term))
-    names = _written(nodes)
+    names = names_of_copies(nodes)
     for node in nodes:
-        text = _node(node if not names else _renamed(node, names), texts)
+        text = _number(node, numbers) or _node(node if not names else renamed(node, names), texts)
         texts[node] = text if len(text.text) <= limit else _Text(LEFT_OUT, _ATOM)
     return texts
 
@@ -131,74 +124,30 @@ def _short(term: Term) -> str:
     return format_term(term, 200)
 
 
-def plainly_bound(term: Term) -> Term:
-    """The same term with names for its copies of bound variables that a program can write, as `format_term` has them:
-    whoever writes a part of it has the names of the whole."""
-    nodes = tuple(postorder(term))
-    names = _written(nodes)
-    if not names:
-        return term
-    found: dict[Term, Term] = {}
-    for node in nodes:
-        found[node] = _renamed(rebuild(node, tuple(found[child] for child in children(node))), names)
-    return found[term]
-
-
-def _written(nodes: tuple[Term, ...]) -> Mapping[str, str]:
-    """For each name that nobody can write one that is used for nothing else in these nodes."""
-    used = dict.fromkeys(name for node in nodes for name in _names(node))
-    copies = [name for name in used if name.partition("'")[2].isdigit()]  # and not `delta'`, which is a derivative
-    names: dict[str, str] = {}
-    taken = set(used) if copies else set()
-    for name in copies:
-        stem, _, tail = name.partition("'")
-        candidate, number = stem, int(tail)
-        while candidate in taken:
-            candidate, number = f"{stem}{number}", number + 1
-        taken.add(candidate)
-        names[name] = candidate
-    return names
-
-
-def _names(node: Term) -> tuple[str, ...]:
+def _number(node: Term, numbers: Numbers) -> _Text | None:
+    """A number, or a quotient that is written as one; None for other terms."""
     match node:
-        case Var(name=name) | Global(name=name):
-            return (name,)
-        case Lam(params=names) | Integral(variables=names):
-            return names
-        case Sum(variable=name) | Array(variable=name):
-            return (name,)
-        case Fold(variable=name, state=state):
-            return name, state
+        case Const(name=None, value=value):
+            return _numeral(numeral(value, numbers))
+        case Prim(op="div", args=(Const(name=None, value=top), Const(name=None, value=below))):
+            whole = decimal(top, below) if numbers is Numbers.DECIMALS else None
+            return None if whole is None else _numeral(numeral(whole, numbers))
         case _:
-            return ()
+            return None
 
 
-def _renamed(node: Term, names: Mapping[str, str]) -> Term:
-    """The node itself with other names; its children, by which their texts are found, stay as they are."""
-    match node:
-        case Var(name=name):
-            return var(names.get(name, name))
-        case Lam(params=params):
-            return lam(tuple(names.get(p, p) for p in params), node.body)
-        case Integral(variables=variables, bounds=bounds):
-            return integral(tuple(names.get(v, v) for v in variables), bounds, node.body, node.hints)
-        case Sum(variable=name):
-            return sum_(names.get(name, name), node.lo, node.hi, node.body)
-        case Array(variable=name):
-            return array(names.get(name, name), node.size, node.body)
-        case Fold(variable=name, state=state):
-            return fold(names.get(name, name), node.lo, node.hi, names.get(state, state), node.start, node.body)
-        case _:
-            return node
+def _numeral(text: str) -> _Text:
+    return _Text(text, _SIGN if text.startswith("-") else _MUL if "/" in text else _ATOM)
+
+
+def _opposite(number: str) -> str:
+    return "0" if number == "0" else number[1:] if number.startswith("-") else f"-{number}"
 
 
 def _node(node: Term, texts: _Texts) -> _Text:
     match node:
-        case Const(name=name, value=value):
-            return _Text(name, _ATOM) if name is not None else _number(value)
-        case Var(name=name) | Global(name=name):
-            return _Text(name, _ATOM)
+        case Const() | Var() | Global():
+            return _Text(str(node.name), _ATOM)
         case Prim():
             return _builtin(node, texts)
         case If():
@@ -257,21 +206,16 @@ def _last(size: Term, texts: _Texts) -> str:
     """The last place of an array: `n - 1`, and of `n + 1` elements `n`."""
     match size:
         case Const(name=None, value=value):
-            return _number(value - 1).text
+            return numeral(value - 1, Numbers.STORED)
         case Prim(op="add", args=(*rest, Const(name=None, value=value))) if rest:
             last = [texts[part] for part in rest]
-            return _sum([*last, *([_number(value - 1)] if value != 1 else [])])
+            return _sum([*last, *([_numeral(numeral(value - 1, Numbers.STORED))] if value != 1 else [])])
         case _:
             return f"{texts[size].at(_ADD)} - 1"
 
 
 def _list(items: tuple[Term, ...], texts: _Texts) -> str:
     return ", ".join(texts[item].text for item in items)
-
-
-def _number(value: float) -> _Text:
-    text = repr(value).removesuffix(".0")
-    return _Text(text, _SIGN if math.copysign(1.0, value) < 0 else _ATOM)
 
 
 def _projection(node: Proj, texts: _Texts) -> _Text:
@@ -371,16 +315,25 @@ def _sides(surface: Term, texts: _Texts) -> tuple[str, str, bool]:
     """less, more with surface = more - less, and whether to write the greater one first: what is taken away against
     what is added, with a number where it has no minus sign; against the number, where there is only one of the two."""
     parts = surface.args if isinstance(surface, Prim) and surface.op == "add" else (surface,)
-    numbers = [p for p in parts if isinstance(p, Const) and p.name is None]
+    numbers = [texts[p].text for p in parts if _is_number(p)]
     if len(numbers) == len(parts):
         return "0", texts[surface].at(_ADD), True
-    taken = [texts[p.args[0]] for p in parts if isinstance(p, Prim) and p.op == "neg"]
-    added = [texts[p] for p in parts if p not in numbers and not (isinstance(p, Prim) and p.op == "neg")]
+    others = [p for p in parts if not _is_number(p)]
+    taken = [texts[p.args[0]] for p in others if isinstance(p, Prim) and p.op == "neg"]
+    added = [texts[p] for p in others if not (isinstance(p, Prim) and p.op == "neg")]
     if taken and added:
         for number in numbers:
-            (added if number.value > 0 else taken).append(_number(abs(number.value)))
+            (taken if number.startswith("-") else added).append(_numeral(number.removeprefix("-")))
         return _sum(taken), _sum(added), False
-    value = sum(p.value for p in numbers)
     if taken:
-        return _sum(taken), _number(value).text, False
-    return _number(-value if value else 0.0).text, _sum(added), True
+        return _sum(taken), _sum(list(map(_numeral, numbers))) if numbers else "0", False
+    return _sum([_numeral(_opposite(number)) for number in numbers]) if numbers else "0", _sum(added), True
+
+
+def _is_number(term: Term) -> bool:
+    """Whether a side of a comparison can be this: a number or a fraction."""
+    match term:
+        case Prim(op="neg", args=(Prim(op="div") as part,)) | (Prim(op="div") as part):
+            return all(isinstance(arg, Const) and arg.name is None for arg in part.args)
+        case _:
+            return isinstance(term, Const) and term.name is None

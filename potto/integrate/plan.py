@@ -19,7 +19,7 @@ from potto.calculus.algebra.polytopes import Number
 from potto.calculus.decomposition.surface_cuts import along
 from potto.calculus.differentiation.level_sets import LevelSet, placed_along
 from potto.calculus.inlining.expand import expanded
-from potto.calculus.inlining.unrolled import unrolled, written_out
+from potto.calculus.inlining.unrolled import loops_unrolled, unrolled
 from potto.calculus.surfaces.discontinuities import findings
 from potto.calculus.surfaces.finding import Decide, Finding, Resolve
 from potto.calculus.surfaces.hoist import hidden, hoisted, split_at_bounds
@@ -328,7 +328,7 @@ def inlined(term: Integral, inline: Resolve, decisions: Mapping[Term, float | No
     """The integrand with calls of known functions carried out, and sums that jump written out as far as these
     decisions tell their summands."""
     passed = {name: f for name in sorted(term.body.free) if (f := inline(var(name))) is not None}
-    return written_out(expanded(substitute(term.body, passed), inline), decisions)
+    return loops_unrolled(expanded(substitute(term.body, passed), inline), decisions)
 
 
 def _inner_integrals(term: Integral) -> Iterable[Integral]:

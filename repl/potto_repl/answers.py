@@ -14,6 +14,7 @@ from msgspec.structs import replace
 from potto.calculus.differentiation.higher_order import NoText, first_derivative
 from potto.calculus.explanation.explain import describe
 from potto.calculus.explanation.layout import DerivativeText
+from potto.calculus.explanation.notation import Notation, numbers_of
 from potto.checking.typeset import derivative_latex
 from potto.core.printer import format_term
 from potto.core.terms import App, Deriv, Global, Lam, Term
@@ -131,25 +132,26 @@ def _kept_parts(session: Conversation, file: str, expr: nodes.Expr, dual: Estima
 
 def _in_symbols(session: Conversation, name: str) -> tuple[str, DerivativeText | None]:
     """A function as it is written, nothing where that is too long; and of a derivative what it is in symbols."""
-    term = elaborate_expression(session.db, session.file, nodes.Name(Span(0, 0), name)).term
+    term = whole = elaborate_expression(session.db, session.file, nodes.Name(Span(0, 0), name)).term
     while isinstance(term, Global):
         known = session.world.lookup(term.module, term.name)
         if isinstance(known, Lam) and not ANSWER.fullmatch(term.name):
             break  # a function that has a name
         term = known
-    text, head = format_term(term), term
+    numbers = numbers_of(session.db, whole)
+    text, head = format_term(term, numbers=numbers), term
     while isinstance(head, App):
         head = head.function
-    found = _derivative(session, head.function) if isinstance(head, Deriv) else None
+    found = _derivative(session, head.function, Notation(numbers=numbers)) if isinstance(head, Deriv) else None
     return text if len(text) <= LONG else "", found
 
 
-def _derivative(session: Conversation, function: Term) -> DerivativeText | None:
+def _derivative(session: Conversation, function: Term, notation: Notation) -> DerivativeText | None:
     def resolve(target: Global) -> Term:
         return session.world.lookup(target.module, target.name)
 
     try:
-        return describe(first_derivative(function, resolve), "", "", resolve)
+        return describe(first_derivative(function, resolve), "", "", resolve, notation)
     except NoText:
         return None
 

@@ -7,6 +7,7 @@ import textwrap
 import pytest
 
 from potto.calculus.explanation.explain import DerivativeText, describe, explain_derivative
+from potto.calculus.explanation.notation import Notation
 from potto.core.terms import Global, Term
 from potto.elaborate import core
 from potto.query import Database
@@ -162,9 +163,9 @@ def test_a_long_formula_gives_way_while_it_is_written() -> None:
     def resolve(target: Global) -> Term:
         return core(db, target.module, target.name).term
 
-    assert describe(term, "f", "", resolve).tangent == "exp(c + c^2)*(2*c + 1)*dc"
+    assert describe(term, "f", "", resolve, Notation()).tangent == "exp(c + c^2)*(2*c + 1)*dc"
     with pytest.raises(Enough):
-        describe(term, "f", "", resolve, pause=pause)
+        describe(term, "f", "", resolve, Notation(), pause)
 
 
 def test_roots_are_named_where_they_exist() -> None:

@@ -6,7 +6,8 @@ import pytest
 from core_terms import HALF, TWO, area, bracket, c, n, t, terms, x, y
 from hypothesis import given, settings
 
-from potto.core.printer import format_term
+from potto.core.numerals import Numbers
+from potto.core.printer import format_equation, format_term
 from potto.core.terms import (
     INF,
     ONE,
@@ -88,6 +89,47 @@ f = global_("/somewhere/m.po", "f")
 )
 def test_text(term: Term, text: str) -> None:
     assert format_term(term) == text
+
+
+TENTH = prim("div", ONE, const(10.0))
+
+
+@pytest.mark.parametrize(
+    ("term", "fractions", "decimals"),
+    [
+        (HALF, "1/2", "0.5"),
+        (const(-0.5), "-1/2", "-0.5"),
+        (const(0.3), "3/10", "0.3"),
+        (const(1 / 3), "1/3", "0.3333333333333333"),
+        (const(0.30000000000000004), "0.30000000000000004", "0.30000000000000004"),  # rounded: no fraction is this
+        (const(1 / 65), "0.015384615384615385", "0.015384615384615385"),  # nobody divides by 65
+        (const(1e-300), "1e-300", "1e-300"),
+        (INF, "inf", "inf"),
+        (TENTH, "1/10", "0.1"),
+        (prim("div", const(3.0), const(7.0)), "3/7", "3/7"),
+        (add(div(pow_(x, HALF), y), pow_(HALF, x)), "x^(1/2)/y + (1/2)^x", "x^0.5/y + 0.5^x"),
+        (prim("div", x, HALF), "x/(1/2)", "x/0.5"),
+        (prim("mul", x, HALF), "x*(1/2)", "x*0.5"),
+        (prim("pow", const(-0.5), TWO), "(-1/2)^2", "(-0.5)^2"),
+        (prim("div", x, TENTH), "x/(1/10)", "x/0.1"),
+        (bracket(add(x, HALF)), "[x >= -1/2]", "[x >= -0.5]"),
+        (bracket(sub(HALF, x)), "[x <= 1/2]", "[x <= 0.5]"),
+        (bracket(sub(prim("div", ONE, const(3.0)), x)), "[x <= 1/3]", "[x <= 1/3]"),
+        (bracket(sub(x, prim("div", ONE, const(3.0)))), "[x >= 1/3]", "[x >= 1/3]"),
+        (bracket(add(x, TENTH)), "[x >= -1/10]", "[x >= -0.1]"),
+        (bracket(add(x, neg(y), const(-0.25))), "[y + 1/4 <= x]", "[y + 0.25 <= x]"),
+        (sum_("k", ZERO, n, mul(HALF, var("k"))), "sum k in 0..n (1/2*k)", "sum k in 0..n (0.5*k)"),
+        (proj(proj(var("w"), 0), 5), "w.0.5", "w.0.5"),  # a place in a tuple
+    ],
+)
+def test_numbers_are_written_as_the_program_has_them(term: Term, fractions: str, decimals: str) -> None:
+    assert format_term(term, numbers=Numbers.FRACTIONS) == fractions
+    assert format_term(term, numbers=Numbers.DECIMALS) == decimals
+
+
+def test_equations_end_with_their_number() -> None:
+    assert format_equation(sub(x, HALF), numbers=Numbers.FRACTIONS) == "x = 1/2"
+    assert format_equation(add(mul(x, y), const(-1 / 3)), numbers=Numbers.FRACTIONS) == "x*y = 1/3"
 
 
 @pytest.mark.parametrize(

@@ -251,7 +251,7 @@ def _squared(form: Polynomial, strict: bool, box: Box) -> list[Inequality] | Non
         return [NEVER]
     if scale < 0:  # sqrt(u) < rest
         return (
-            [exists, Inequality(written_out(sub(mul(rest, rest), inside)), strict)]
+            [exists, Inequality(multiplied_out(sub(mul(rest, rest), inside)), strict)]
             if range_of(rest, box).lo >= 0
             else None
         )
@@ -259,7 +259,7 @@ def _squared(form: Polynomial, strict: bool, box: Box) -> list[Inequality] | Non
         return [Inequality(inside, strict)]
     if range_of(rest, box).lo >= 0:
         return [exists]
-    return [Inequality(written_out(sub(inside, mul(rest, rest))), strict)] if range_of(rest, box).hi <= 0 else None
+    return [Inequality(multiplied_out(sub(inside, mul(rest, rest))), strict)] if range_of(rest, box).hi <= 0 else None
 
 
 def _below_square(form: Polynomial, strict: bool) -> list[Inequality] | None:
@@ -297,7 +297,7 @@ def _odd_root(form: Polynomial, strict: bool) -> list[Inequality] | None:
     return [Inequality(sub(u, bound) if scale > 0 else sub(bound, u), strict)]
 
 
-def written_out(term: Term) -> Term:
+def multiplied_out(term: Term) -> Term:
     """The same as a sum, if it is one of polynomials."""
     found = normal(term)
     written = as_term(found.top) if found is not None and found.whole else None
@@ -331,5 +331,5 @@ def _excludes(first: Inequality, second: Inequality) -> bool:
 
 def implies(first: Inequality, second: Inequality) -> bool:
     """Whether the second holds wherever the first does: its surface is the other's and what is never below 0."""
-    more = range_of(written_out(sub(second.surface, first.surface)))
+    more = range_of(multiplied_out(sub(second.surface, first.surface)))
     return more.lo > 0 or (more.lo == 0 and (first.strict or not second.strict))

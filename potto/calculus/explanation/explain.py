@@ -22,14 +22,13 @@ from potto.calculus.differentiation.higher_order import moving_deltas
 from potto.calculus.differentiation.level_sets import level_set
 from potto.calculus.differentiation.root_names import RootNames, names_in
 from potto.calculus.explanation.continuity import continuous
-from potto.calculus.explanation.decimals import in_decimals
 from potto.calculus.explanation.divisors import divided_by
 from potto.calculus.explanation.fields import fields_of
-from potto.calculus.explanation.fractions import as_the_program_writes
 from potto.calculus.explanation.layout import DerivativeText, IntegralText, SurfaceText
+from potto.calculus.explanation.notation import Notation, Rewrite, notation_of, numbers_of
 from potto.calculus.explanation.plain_names import Each, apart, plainly_indexed, plainly_named
 from potto.calculus.explanation.readable import ReadableParts, readable
-from potto.calculus.explanation.symbols import Formula, NoFormula, Rewrite, Words, over_functions, shorter
+from potto.calculus.explanation.symbols import Formula, NoFormula, Words, over_functions, shorter
 from potto.calculus.inlining.expand import Resolve, heads_of
 from potto.calculus.solving.pivots import NoClosedForm, Roots, SurfaceRoot, pivots
 from potto.calculus.solving.solve import factors
@@ -37,7 +36,6 @@ from potto.calculus.surfaces.branch_assignment import box_of, branches_of, with_
 from potto.calculus.surfaces.branch_assignment import unguarded as where_it_exists
 from potto.calculus.surfaces.branch_cuts import opened
 from potto.calculus.surfaces.case_split import unnested
-from potto.core.printer import format_equation, format_term
 from potto.core.simplify import normalized_surface, simplify
 from potto.core.terms import (
     ONE,
@@ -52,6 +50,7 @@ from potto.core.terms import (
     Term,
     app,
     children,
+    global_,
     integral,
     lam,
     stem,
@@ -61,7 +60,6 @@ from potto.core.terms import (
 )
 from potto.diagnostics import PottoError
 from potto.elaborate import core_term
-from potto.modules import definition
 from potto.query import Database, query
 from potto.types import Type, derivative_type, format_type, groups_of, interface
 
@@ -78,24 +76,14 @@ def explain_derivative(db: Database, file: str, name: str) -> DerivativeText:
     original = _original(term, name, resolve)
     if original is not None:
         of, shown = original
-        type = derivative_type(interface(db, of.module, of.name).type) if isinstance(of, Global) else found.type
-        known = interface(db, of.module, of.name).type if isinstance(of, Global) else None
-        text = describe(
-            resolve(of) if isinstance(of, Global) else of,
-            shown,
-            format_type(type),
-            resolve,
-            fields_of(db, known),
-            db.give_way,
-        )
-        where = (of.module, of.name) if isinstance(of, Global) else (file, name)
-        return as_the_program_writes(replace(text, by=name), definition(db, *where))
-    given = _applied(term, found.type)
+        type, notation = found.type, Notation(numbers=numbers_of(db, global_(file, name)))
+        if isinstance(of, Global):
+            type = derivative_type(interface(db, of.module, of.name).type)
+            notation = Notation(fields_of(db, interface(db, of.module, of.name).type), notation.numbers)
+        whole = resolve(of) if isinstance(of, Global) else of
+        return replace(describe(whole, shown, format_type(type), resolve, notation, db.give_way), by=name)
     type_text = format_type(derivative_type(found.type))
-    text = describe(given, name, type_text, resolve, fields_of(db, found.type), db.give_way)
-    while isinstance(term, Global):  # another name for it
-        file, name, term = term.module, term.name, resolve(term)
-    return as_the_program_writes(text, definition(db, file, name))
+    return describe(_applied(term, found.type), name, type_text, resolve, notation_of(db, file, name), db.give_way)
 
 
 def _original(term: Term, name: str, resolve: Resolve) -> tuple[Term, str] | None:
@@ -131,10 +119,10 @@ def _applied(term: Term, type: Type) -> Term:
 
 
 def describe(
-    term: Term, name: str, type_text: str, resolve: Resolve, fields: Rewrite = lambda term: term,
+    term: Term, name: str, type_text: str, resolve: Resolve, notation: Notation,
     pause: Callable[[], None] = lambda: None,
 ) -> DerivativeText:  # fmt: skip
-    """The same for a term; `fields` names those of records, `pause` may raise what ends it."""
+    """The same for a term; `pause` may raise what ends it."""
     body, params = term, list[str]()
     while isinstance(body, Lam):
         params.extend(body.params)
@@ -143,7 +131,7 @@ def describe(
     tangents: dict[str, Term] = {p: var(f"d{p}") for p in params}
     words = Words(
         {p: f"d{p}" for p in params if p in heads_of(term)},
-        fields,
+        notation,
         frozenset(params) | {f"d{p}" for p in params},
         frozenset(f"d{p}" for p in params),
         ReadableParts(pause),
@@ -173,7 +161,7 @@ def describe(
     found = replace(found, divisors=divided_by(tangent, (body, work.carried_out(body)), conditions, words))
     if not integrals and not problems:
         plain = work.carried_out(body)
-        found = replace(found, surfaces=_own_surfaces(plain, tangents))
+        found = replace(found, surfaces=_own_surfaces(plain, tangents, notation))
         return _with_deltas(found, plain, work, tangents, words)
     return found
 
@@ -224,7 +212,7 @@ def _with_deltas(
         deltas = tuple(text for item in moving if (text := words.text(item.contribution)) != "0")
     except NoFormula as problem:
         return replace(found, tangent="", smooth="", problems=(*found.problems, str(problem)))
-    found = replace(found, continuous=tuple(equation(item.surface) for item in meeting))
+    found = replace(found, continuous=tuple(words.notation.equation(item.surface) for item in meeting))
     first = f"({smooth})" if smooth.startswith("if ") else smooth  # an `else` would take in what is added
     parts = (smooth,) if not deltas else deltas if smooth == "0" else (first, *deltas)
     return replace(found, tangent=_sum_of(parts), smooth=smooth, deltas=deltas)
@@ -261,7 +249,7 @@ def _integral(
             if _outside(item.surface, box):
                 continue
             if continuous(item, node.variables):
-                meeting.append(equation(words.fields(item.surface), node.variables))
+                meeting.append(words.equation(item.surface, node.variables))
             else:
                 deltas.append(words.under_integral(item.contribution, *names, box=box))
         deltas += [words.under_integral(t, *names, box=box) for t in moving_deltas(node, rate)]
@@ -275,7 +263,7 @@ def _integral(
         reason = str(problem)
     except PottoError as problem:
         reason = problem.diagnostics[0].message
-    head = format_term(words.fields(integral(node.variables, node.bounds, ONE))).rpartition(" 1 ")[0]
+    head = words.notation.text(words.notation.fields(integral(node.variables, node.bounds, ONE))).rpartition(" 1 ")[0]
     return IntegralText(
         head,
         ", ".join(node.variables),
@@ -353,7 +341,7 @@ def _surfaces(node: Integral, tangents: Mapping[str, Term], words: Words) -> tup
             except NoClosedForm:
                 pass
             found[canonical] = SurfaceText(
-                equation(words.fields(factor), node.variables),
+                words.equation(factor, node.variables),
                 tuple(sorted(factor.free & tangents.keys())),
                 tuple(roots),
             )
@@ -366,11 +354,11 @@ def _root(root: SurfaceRoot, words: Words) -> str:
     index = root.index and apart(stem(root.index), (at.free | words.names | {root.variable}) - {root.index})
     if root.index and index:
         at = substitute(at, {root.index: var(index)})
-    text = format_term(readable(simplify(words.fields(at)), frozenset()))
+    text = words.notation.text(readable(simplify(words.notation.fields(at)), frozenset()))
     return f"{text} for integers {index}" if index else text
 
 
-def _own_surfaces(body: Term, tangents: Mapping[str, Term]) -> tuple[SurfaceText, ...]:
+def _own_surfaces(body: Term, tangents: Mapping[str, Term], notation: Notation) -> tuple[SurfaceText, ...]:
     """Where a body without an integral jumps."""
     found: dict[Term, SurfaceText] = {}
     for item in branches_of(opened(body), tangents):
@@ -378,13 +366,5 @@ def _own_surfaces(body: Term, tangents: Mapping[str, Term]) -> tuple[SurfaceText
             continue
         canonical = normalized_surface(item.surface)[0]
         moved = tuple(name for name in tangents if name in item.surface.free)
-        found.setdefault(canonical, SurfaceText(equation(item.surface), moved, ()))
+        found.setdefault(canonical, SurfaceText(notation.equation(item.surface), moved, ()))
     return tuple(found.values())
-
-
-# Text
-
-
-def equation(surface: Term, variables: Iterable[str] = ()) -> str:
-    """Where a surface is, as people write it: `x = t` for t - x, where x is one of the variables."""
-    return format_equation(simplify(in_decimals(surface)), variables)

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from potto.core.printer import format_term, plainly_bound
+from potto.core.copies import plainly_bound
+from potto.core.printer import format_term
 from potto.core.terms import (
     ZERO,
     App,

@@ -7,7 +7,7 @@ is the second of one, `snd(deriv(f)((c, dc)))`, and of a parameter `shader`, who
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 
 from msgspec import Struct
 
@@ -18,9 +18,10 @@ from potto.calculus.differentiation.root_names import RootNames
 from potto.calculus.explanation.bound_names import as_written, named_alike
 from potto.calculus.explanation.decimals import in_decimals
 from potto.calculus.explanation.guarded import guarded
+from potto.calculus.explanation.notation import Notation
 from potto.calculus.explanation.readable import ReadableParts, readable
 from potto.calculus.surfaces.trace import spine
-from potto.core.printer import LEFT_OUT, format_term
+from potto.core.printer import LEFT_OUT
 from potto.core.simplify import simplify
 from potto.core.terms import (
     ONE,
@@ -53,7 +54,6 @@ from potto.core.terms import (
 from potto.primitives import PRIMITIVES
 
 _SECOND = var("snd")
-Rewrite = Callable[[Term], Term]
 
 
 class NoFormula(Exception):
@@ -68,10 +68,10 @@ class Formula(Struct, frozen=True):
 
 
 class Words(Struct, frozen=True):
-    """How the terms of one derivative are written: the names of its parameters' derivatives, the fields of records."""
+    """How the terms of a derivative are written: the names of its parameters' derivatives, and the program's words."""
 
     functions: Mapping[str, str]
-    fields: Rewrite
+    notation: Notation
     names: frozenset[str]
     tangents: frozenset[str]
     progress: ReadableParts
@@ -79,14 +79,19 @@ class Words(Struct, frozen=True):
 
     def plain(self, term: Term) -> str:
         """A term as it is written, parts of records by their names."""
-        return format_term(simplify(in_decimals(self.fields(as_written(term, self.names)))))
+        named = self.notation.fields(as_written(term, self.names))
+        return self.notation.text(simplify(in_decimals(named)))
+
+    def equation(self, surface: Term, variables: Iterable[str]) -> str:
+        """Where a surface is, `x = t` for t - x."""
+        return self.notation.equation(self.notation.fields(surface), variables)
 
     def condition(self, term: Term) -> str:
         """A comparison as people write it: `s > 0` for -s < s."""
         match term:
             case Prim(op="lt", args=(left, right)):
-                bracket = branch((simplify(self.fields(sub(right, left))),), True, ONE, ZERO)
-                return format_term(readable(bracket, frozenset()))[1:-1]
+                bracket = branch((simplify(self.notation.fields(sub(right, left))),), True, ONE, ZERO)
+                return self.notation.text(readable(bracket, frozenset()))[1:-1]
             case _:
                 return self.plain(term)
 
@@ -108,7 +113,7 @@ class Words(Struct, frozen=True):
         return self._written(self._readable(term, inside, box))
 
     def _root(self, term: Term) -> Term:
-        return readable(simplify(self.fields(term)), frozenset())
+        return readable(simplify(self.notation.fields(term)), frozenset())
 
     def _readable(self, term: Term, inside: tuple[str, ...], box: Box | None) -> Term:
         plain = symbols(without_guards(simplify(transform(term, _by_formula))), self.functions)
@@ -117,11 +122,10 @@ class Words(Struct, frozen=True):
         if strangers:
             raise NoFormula(f"where it jumps depends on `{min(strangers)}`, over which it is summed")
         alike = named_alike(plain, self.names.union(inside, self.roots.meanings))
-        return readable(simplify(self.fields(alike)), self.tangents, box, self.progress)
+        return readable(simplify(self.notation.fields(alike)), self.tangents, box, self.progress)
 
-    @staticmethod
-    def _written(term: Term) -> str:
-        text = format_term(term)
+    def _written(self, term: Term) -> str:
+        text = self.notation.text(term)
         if LEFT_OUT in text:
             raise NoFormula("the formula is too long to be shown")
         return text

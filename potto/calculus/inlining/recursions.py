@@ -1,7 +1,7 @@
 """Recursions written out for the values at hand, before derivatives are taken of them.
 
-Owns `written_out`. The jumps of a recursion are seen once its calls are carried out as deep as they go: then the deltas
-of its derivative are those of a formula.
+Owns `recursions_unrolled`. The jumps of a recursion are seen once its calls are carried out as deep as they go: then the
+deltas of its derivative are those of a formula.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from potto.core.terms import (
 )
 
 
-def written_out(term: Term, resolve: Resolve, decide: Decide) -> Term | None:
+def recursions_unrolled(term: Term, resolve: Resolve, decide: Decide) -> Term | None:
     """An equal term in which calls are carried out as deep as plain conditions say, also in functions that are derived;
     None if there are too many.
 
@@ -72,7 +72,7 @@ def _opened(call: App, resolve: Resolve, decide: Decide) -> Term | None:
         names.append(name)
         here[name] = _primal(value, order)
     renamed = substitute(body, {param: var(name) for param, name in zip(params, names, strict=True)})
-    opened = written_out(renamed, resolve, lambda plain: decide(substitute(plain, here)))
+    opened = recursions_unrolled(renamed, resolve, lambda plain: decide(substitute(plain, here)))
     if opened is None:
         return None
     made: Term = opened

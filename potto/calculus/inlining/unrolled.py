@@ -1,8 +1,8 @@
 """Terms with everything carried out that plain values decide: calls, the sides of plain conditionals, sums.
 
-Owns `unrolled` and `written_out`. `expand` leaves a recursion as a call, since how deep it goes is a matter of values;
-here the values are known, so that a simulation of n steps becomes one term, in which a state that is met again is one
-object.
+Owns `unrolled` and `loops_unrolled`. `expand` leaves a recursion as a call, since how deep it goes is a matter of
+values; here the values are known, so that a simulation of n steps becomes one term, in which a state that is met again
+is one object.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ def unrolled(term: Term, resolve: Resolve, decide: Decide, most: int = MOST_SUMM
         return None
 
 
-def written_out(term: Term, decisions: Mapping[Term, float | None]) -> Term:
+def loops_unrolled(term: Term, decisions: Mapping[Term, float | None]) -> Term:
     """An equal term in which sums and folds that jump are written out, calls left as they are. decisions: the values
     of plain terms, as far as these are known."""
     if not (holds_loop(term) and holds_branch(term)):

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from potto.calculus.checking.solvability import ConditionProblem, Role, judge
-from potto.core.printer import format_term
+from potto.calculus.explanation.notation import Notation, numbers_in
 from potto.core.simplify import simplify
 from potto.core.terms import Branch, Hole, Term, postorder
 from potto.diagnostics import Diagnostic
@@ -78,8 +78,13 @@ def completed_diffeo(place: At, chunk: ChunkAt, condition: Expr) -> str | None:
     verdict = judged(place.db, chunk, condition, "map")
     if not isinstance(verdict, tuple):
         return None
-    shown = [format_term(simplify(part)) for part in verdict]
+    notation = _notation(place.db, chunk)
+    shown = [notation.text(simplify(part)) for part in verdict]
     return f"diffeo({', '.join(shown)})"
+
+
+def _notation(db: Database, chunk: ChunkAt) -> Notation:
+    return Notation(numbers=numbers_in(chunk.parsed(db).item))
 
 
 def judged(
@@ -143,7 +148,7 @@ def written_inverse(place: At) -> Change | None:
     info = diffeo_of(place.db, place.file, item.name)
     if info is None or len(info.branches) != 1:
         return None
-    text = inverse_text(info.values, (format_term(part) for part in info.branches[0]))
+    text = inverse_text(info.values, map(_notation(place.db, chunk).text, info.branches[0]))
     edit = inverse_edit(chunk, item, text)
     relative = Edit(edit.span.shift(-chunk.start), edit.text)
     return one_file(place.file, edit) if reads(chunk, [relative]) is not None else None

@@ -16,7 +16,14 @@ from potto.core.printer import format_term
 from potto.core.simplify import simplify
 from potto.core.terms import App, Branch, Delta, Integral, Term, add, const, mul, postorder, substitute
 from potto.elaborate import core
-from potto.ide.hover.derivatives import Functions, condition_infos, conditions, is_sound, shown_equation
+from potto.ide.hover.derivatives import (
+    Functions,
+    condition_infos,
+    conditions,
+    is_sound,
+    shown_equation,
+    written_notation,
+)
 from potto.query import Database, query
 from potto.source import Span
 
@@ -43,11 +50,12 @@ def pixel_conditions(db: Database, file: str, name: str, given: Functions = ()) 
     if not is_sound(db, file, name):
         return ()
     elaborated = core(db, file, name)
+    notation = written_notation(db, file, name)
     spans, params, middles = dict(elaborated.origins), parameters_of(elaborated.term), _middles(elaborated.term)
     shown = {(info.span, info.equation) for info in condition_infos(db, file, name, given) if not info.problem}
     found: dict[PixelCondition, None] = {}
     for condition in conditions(db, file, name, given):
-        span, equation = spans.get(condition.anchor), shown_equation(condition.surface, condition.variables)
+        span, equation = spans.get(condition.anchor), shown_equation(condition.surface, condition.variables, notation)
         surface = _in_the_middle(condition.surface, middles)
         if span is None or (span, equation) not in shown or surface.free - set(params):
             continue

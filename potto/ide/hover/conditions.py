@@ -8,8 +8,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from potto.calculus.checking.solvability import ConditionProblem
+from potto.calculus.explanation.notation import Notation, numbers_in
 from potto.checking.check import definition_diagnostics
-from potto.core.printer import format_term
 from potto.core.simplify import simplify
 from potto.ide.actions.fixes_of_conditions import compared, judged
 from potto.ide.hover.derivatives import code, condition_infos, condition_markdown, fence
@@ -121,7 +121,8 @@ def _judged(db: Database, chunk: ChunkAt, comparison: nodes.Expr) -> str | None:
         return "\n\n".join([f"**no diffeomorphism**: {verdict.message}", *verdict.notes])
     if verdict is None:
         return None
-    return fence(f"diffeo({', '.join(format_term(simplify(part)) for part in verdict)})")
+    write = Notation(numbers=numbers_in(chunk.parsed(db).item, comparison)).text
+    return fence(f"diffeo({', '.join(write(simplify(part)) for part in verdict)})")
 
 
 def _names(db: Database, chunk: ChunkAt, place: Span) -> Iterable[str]:

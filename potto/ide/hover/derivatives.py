@@ -13,15 +13,15 @@ from msgspec import Struct
 from potto.calculus.checking.conditions import Condition, called_by, conditions_of
 from potto.calculus.checking.diffeo import DiffeoInfo, diffeo_info, exported
 from potto.calculus.checking.solvability import ConditionProblem, Verdict, judge
-from potto.calculus.explanation.explain import equation, explain_derivative
+from potto.calculus.explanation.explain import explain_derivative
 from potto.calculus.explanation.layout import DerivativeText, IntegralText
+from potto.calculus.explanation.notation import Notation, numbers_of
 from potto.calculus.explanation.readable import readable
 from potto.calculus.inlining.currying import parameters_of
 from potto.calculus.solving.inverse_map import InverseMap, invert
 from potto.checking.check import has_errors
-from potto.core.printer import format_term
 from potto.core.simplify import simplify
-from potto.core.terms import Deriv, Global, Hole, Lam, Term, postorder
+from potto.core.terms import Deriv, Global, Hole, Lam, Term, global_, postorder
 from potto.elaborate import core, core_term, elaborate_expression
 from potto.ide.names.live_expressions import wrong_with
 from potto.modules import definition, dependencies, is_recursive, references
@@ -110,7 +110,7 @@ def condition_infos(db: Database, file: str, name: str, given: Functions = ()) -
         return ()
     elaborated = core(db, file, name)
     spans = dict(elaborated.origins)
-    parameters = parameters_of(elaborated.term)
+    parameters, notation = parameters_of(elaborated.term), written_notation(db, file, name)
     out: dict[ConditionInfo, None] = {}
     for condition in conditions(db, file, name, given):
         span = spans.get(condition.anchor)
@@ -120,11 +120,17 @@ def condition_infos(db: Database, file: str, name: str, given: Functions = ()) -
         verdict = judge(
             condition.coordinates, condition.variables, condition.box, role="delta" if condition.delta else "bracket"
         )
-        out[_info(span, condition.coordinates, condition.variables, verdict, moved, condition.calls)] = None
+        out[_info(notation, span, condition.coordinates, condition.variables, verdict, moved, condition.calls)] = None
     return tuple(sorted(out, key=lambda info: info.span))
 
 
+def written_notation(db: Database, file: str, name: str) -> Notation:
+    """How the conditions of a definition are written."""
+    return Notation(numbers=numbers_of(db, global_(file, name)))
+
+
 def _info(
+    notation: Notation,
     span: Span,
     coordinates: tuple[Term, ...],
     variables: tuple[str, ...],
@@ -132,7 +138,7 @@ def _info(
     moved: tuple[str, ...],
     calls: tuple[str, ...],
 ) -> ConditionInfo:
-    shown, where = _terms(coordinates), shown_equation(coordinates[0], variables)
+    shown, where = _terms(coordinates, notation), shown_equation(coordinates[0], variables, notation)
     if isinstance(verdict, ConditionProblem):
         said = (*verdict.notes, *([verdict.help] if verdict.help else []))
         return ConditionInfo(
@@ -143,40 +149,36 @@ def _info(
     if inverse is None and len(completed) == len(variables):
         found = invert(completed, variables)
         inverse = found if isinstance(found, InverseMap) else None
-    roots = () if verdict.roots is None else tuple(map(_readable, verdict.roots.roots))
+    found_roots = () if verdict.roots is None else verdict.roots.roots
+    roots = tuple([_term(readable(simplify(root), frozenset()), notation) for root in found_roots])
     return ConditionInfo(
         span,
         variables,
         shown,
         where,
-        _terms(verdict.completion),
+        _terms(verdict.completion, notation),
         verdict.pivot,
         roots,
-        () if inverse is None else tuple(_terms(branch) for branch in inverse.branches),
+        () if inverse is None else tuple(_terms(branch, notation) for branch in inverse.branches),
         () if inverse is None else inverse.values,
-        "" if verdict.determinant is None else _term(verdict.determinant),
+        "" if verdict.determinant is None else _term(verdict.determinant, notation),
         moved_by=moved,
         calls=calls,
         searched=bool(verdict.searched),
     )
 
 
-def shown_equation(surface: Term, variables: Iterable[str]) -> str:
+def shown_equation(surface: Term, variables: Iterable[str], notation: Notation) -> str:
     """Where a surface is, for a person to read."""
-    return _plain(equation(simplify(surface), variables))
+    return _plain(notation.equation(simplify(surface), variables))
 
 
-def _term(term: Term) -> str:
-    text = format_term(simplify(term))
-    return _plain(text)
+def _term(term: Term, notation: Notation) -> str:
+    return _plain(notation.text(simplify(term)))
 
 
-def _readable(term: Term) -> str:
-    return _plain(format_term(readable(simplify(term), frozenset())))
-
-
-def _terms(terms: Iterable[Term]) -> tuple[str, ...]:
-    return tuple(_term(term) for term in terms)
+def _terms(terms: Iterable[Term], notation: Notation) -> tuple[str, ...]:
+    return tuple(_term(term, notation) for term in terms)
 
 
 def _plain(text: str) -> str:
@@ -307,9 +309,10 @@ def diffeo_markdown(db: Database, file: str, name: str) -> str | None:
     info = diffeo_of(db, file, name)
     if info is None:
         return None
-    lines = [f"- inverse: {code(inverse_text(info.values, map(format_term, branch)))}" for branch in info.branches]
+    write = written_notation(db, file, name).text
+    lines = [f"- inverse: {code(inverse_text(info.values, map(write, branch)))}" for branch in info.branches]
     if info.determinant is not None:
-        lines.append(f"- determinant: {code(format_term(info.determinant))}")
+        lines.append(f"- determinant: {code(write(info.determinant))}")
     lines.append(f"- found: {info.method}" if info.method != "given" else "- the inverse was given by the author")
     lines += [f"- {note}" for note in info.notes]
     return "\n".join(lines)

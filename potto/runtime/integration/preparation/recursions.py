@@ -9,7 +9,7 @@ from itertools import chain
 
 import numpy as np
 
-from potto.calculus.inlining.recursions import written_out
+from potto.calculus.inlining.recursions import recursions_unrolled
 from potto.core.terms import (
     Branch,
     Delta,
@@ -40,7 +40,7 @@ def in_sight(machine: Machine, term: Integral, env: Env) -> Integral:
     hidden = reach.deltas(term.body) or Delta in reach.kinds(term.body)
     if not hidden or not reach.recursions(term.body):
         return term
-    body = _written_out(machine, term.body, env)
+    body = _unrolled(machine, term.body, env)
     return term if body is term.body else with_integrand(term, body)
 
 
@@ -49,7 +49,7 @@ def alone_in_sight(machine: Machine, function: Lam) -> Lam:
     (P0510) where they don't, and deltas depend on it."""
     if not any(_hides(node.body, machine.linker.reach) for node in _integrals(machine, function.body)):
         return function
-    body = _written_out(machine, function.body, {})
+    body = _unrolled(machine, function.body, {})
     reach = machine.linker.reach
     for node in _integrals(machine, body):
         if any(reach.kinds(name) & {Delta, Deriv} for name in reach.recursions(node.body)) or any(
@@ -64,7 +64,7 @@ def _integrals(machine: Machine, term: Term) -> list[Integral]:
     return [node for node in nodes if isinstance(node, Integral)]
 
 
-def _written_out(machine: Machine, term: Term, env: Env) -> Term:
+def _unrolled(machine: Machine, term: Term, env: Env) -> Term:
     reach = machine.linker.reach
     bound = {name for node in postorder(term) for name in bound_names(node)}
     still = {name for name in env if name not in bound and _stands_still(env[name])}
@@ -73,7 +73,7 @@ def _written_out(machine: Machine, term: Term, env: Env) -> Term:
         return whole(machine, plain, env) if plain.free <= still else None
 
     with making:
-        return written_out(term, reach.resolve, decide) or term
+        return recursions_unrolled(term, reach.resolve, decide) or term
 
 
 def _hides(integrand: Term, reach: Reach) -> bool:

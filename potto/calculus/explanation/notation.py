@@ -1,0 +1,65 @@
+"""How the formulas of a program are written: in its own words, which are those that its author reads.
+
+Owns `Notation`, `notation_of`, `numbers_in` and `numbers_of`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+
+from msgspec import Struct
+
+from potto.calculus.explanation.decimals import in_decimals
+from potto.calculus.explanation.fields import fields_of
+from potto.core.numerals import Numbers
+from potto.core.printer import format_equation, format_term
+from potto.core.simplify import simplify
+from potto.core.terms import Deriv, Global, Term, global_
+from potto.elaborate import core_term
+from potto.modules import definition
+from potto.query import Database
+from potto.syntax import nodes
+from potto.syntax.walk import walk
+from potto.types import interface
+
+Rewrite = Callable[[Term], Term]
+
+
+class Notation(Struct, frozen=True):
+    """fields: gives the parts of records their names. numbers: how those that are not whole are written."""
+
+    fields: Rewrite = lambda term: term
+    numbers: Numbers = Numbers.FRACTIONS
+
+    def text(self, term: Term) -> str:
+        """A term whose fields have their names."""
+        return format_term(term, numbers=self.numbers)
+
+    def equation(self, surface: Term, variables: Iterable[str] = ()) -> str:
+        """Where a surface is, as people write it: `x = t` for t - x, where x is one of the variables."""
+        return format_equation(simplify(in_decimals(surface)), variables, self.numbers)
+
+
+def notation_of(db: Database, file: str, name: str) -> Notation:
+    """That of a definition."""
+    return Notation(fields_of(db, interface(db, file, name).type), numbers_of(db, global_(file, name)))
+
+
+def numbers_in(*programs: nodes.Node | None) -> Numbers:
+    """Fractions, unless there are decimals in one of the programs."""
+    has_decimals = any(_is_decimal(node) for program in programs if program is not None for node in walk(program))
+    return Numbers.DECIMALS if has_decimals else Numbers.FRACTIONS
+
+
+def numbers_of(db: Database, term: Term, *programs: nodes.Node) -> Numbers:
+    """The same of programs and of the definitions that a term names, or of which it names the derivative."""
+    written: list[nodes.Node | None] = [*programs]
+    while isinstance(term, Deriv | Global):
+        if isinstance(term, Global):
+            written.append(definition(db, term.module, term.name))
+        term = term.function if isinstance(term, Deriv) else core_term(db, term.module, term.name)
+    return numbers_in(*written)
+
+
+def _is_decimal(node: nodes.Node) -> bool:
+    return isinstance(node, nodes.Number) and not node.text.isdigit()

@@ -1,0 +1,36 @@
+"""Numbers of a term as text: as they are stored, or as the program around them would have them.
+
+Owns `Numbers` and `numeral`. A term has a number alone, 0.5, whichever way it was written or came about.
+"""
+
+from __future__ import annotations
+
+from enum import Enum
+from fractions import Fraction
+from math import isfinite
+
+_LARGEST = 64  # of what a person divides by
+_POWERS_OF_TEN = [10.0**n for n in range(1, 16)]
+
+
+class Numbers(Enum):
+    """How numbers that are not whole are written: 0.5 as it is stored, 1/2 where a program has whole numbers alone, and
+    where it has decimals 0.1 for one tenth too."""
+
+    STORED = "stored"
+    FRACTIONS = "fractions"
+    DECIMALS = "decimals"
+
+
+def numeral(value: float, numbers: Numbers) -> str:
+    """A number as Potto source; as a fraction only if that is the same double."""
+    if numbers is Numbers.FRACTIONS and isfinite(value) and not value.is_integer():
+        simple = Fraction(value).limit_denominator(_LARGEST)
+        if float(simple) == value:
+            return str(simple)
+    return repr(value).removesuffix(".0")
+
+
+def decimal(top: float, below: float) -> float | None:
+    """The value of a quotient that people write as a decimal, of a whole number by a power of ten; None for others."""
+    return top / below if top.is_integer() and below in _POWERS_OF_TEN else None
