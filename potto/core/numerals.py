@@ -1,6 +1,6 @@
 """Numbers of a term as text: as they are stored, or as the program around them would have them.
 
-Owns `Numbers` and `numeral`. A term has a number alone, 0.5, whichever way it was written or came about.
+Owns `Numbers`, `numeral`, `decimal` and `simple_fraction`. A term has a number alone, 0.5, whichever way it was written or came about.
 """
 
 from __future__ import annotations
@@ -24,11 +24,16 @@ class Numbers(Enum):
 
 def numeral(value: float, numbers: Numbers) -> str:
     """A number as Potto source; as a fraction only if that is the same double."""
-    if numbers is Numbers.FRACTIONS and isfinite(value) and not value.is_integer():
-        simple = Fraction(value).limit_denominator(_LARGEST)
-        if float(simple) == value:
-            return str(simple)
-    return repr(value).removesuffix(".0")
+    simple = simple_fraction(value) if numbers is Numbers.FRACTIONS else None
+    return repr(value).removesuffix(".0") if simple is None else str(simple)
+
+
+def simple_fraction(value: float) -> Fraction | None:
+    """The fraction that a person would write for a number that is not whole; None if it has none."""
+    if not isfinite(value) or value.is_integer():
+        return None
+    simple = Fraction(value).limit_denominator(_LARGEST)
+    return simple if float(simple) == value else None
 
 
 def decimal(top: float, below: float) -> float | None:

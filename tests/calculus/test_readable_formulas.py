@@ -85,10 +85,10 @@ def test_what_never_holds_is_not_shown_and_roots_of_decimals_are_decimals() -> N
                        "def g(t) integral [t, t + 1] [(x - t)^2 < 0.04] d(x)\n"
                        "def h(t) integral [0, 1] [(x - t)^2 < 0.04] d(x)\n")  # fmt: skip
     shown = explain_derivative(library.db, file, "f").tangent
-    assert shown == "dt*[c > 3] - dt*[c > 0] + (dc/3 + dt)*[c > 0 and c < 3]"
+    assert shown == "dt*([c > 3] - [c > 0]) + (dc/3 + dt)*[c > 0 and c < 3]"
     assert explain_derivative(library.db, file, "g").tangent == "0"  # the band moves as the bounds do
     found = explain_derivative(library.db, file, "h").tangent
-    assert found == "([t > -0.2 and t < 0.8] - [t > 0.2 and t < 1.2])*dt"
+    assert found == "dt*([t > -0.2 and t < 0.8] - [t > 0.2 and t < 1.2])"
 
 
 @pytest.mark.parametrize(
@@ -155,8 +155,8 @@ def test_what_all_summands_are_multiples_of_is_cancelled() -> None:
     file = library.put("<text>", "def f(a, b, m, s) (erf((b - m)/(s*sqrt(2))) - erf((a - m)/(s*sqrt(2))))/2\n")
     shown = explain_derivative(library.db, file, "f").tangent
     assert shown == (
-        "exp(-(b - m)^2/(2*s^2))*(s*db + (m - b)*ds - s*dm)/(s^2*sqrt(2*pi))"
-        " + exp(-(a - m)^2/(2*s^2))*((a - m)*ds + s*dm - s*da)/(s^2*sqrt(2*pi))"
+        "(exp(-(b - m)^2/(2*s^2))*(s*db + (m - b)*ds - s*dm)"
+        " + exp(-(a - m)^2/(2*s^2))*((a - m)*ds + s*dm - s*da))/(s^2*sqrt(2*pi))"
     )
 
 

@@ -13,8 +13,8 @@ from fractions import Fraction
 from potto.calculus.algebra.ranges import Box, range_of
 from potto.calculus.algebra.rational_form import equal
 from potto.calculus.explanation.brackets import constant
-from potto.calculus.explanation.factors import Factors, factored, written
-from potto.core.polynomials import size_of
+from potto.calculus.explanation.factors import Factors, factored
+from potto.calculus.explanation.products import written
 from potto.core.terms import (
     ZERO,
     Branch,
@@ -62,12 +62,7 @@ def _apart(node: If | Branch, tangents: frozenset[str]) -> Term:
     if ZERO in (node.then, node.orelse):
         return node
     one, other = factored(node.then), factored(node.orelse)
-    shared = Factors(Fraction(1), {}, [], [c for c in one.conditions if c in other.conditions])
-    for base, n in one.powers.items():
-        m = other.powers.get(base, 0)
-        if n * m > 0:
-            shared.times(base, min(n, m, key=size_of))
-    shared.exponents = [e for e in one.exponents if e in other.exponents]
+    shared = one.shared_with(other)
     alike = abs(one.coefficient) == abs(other.coefficient)
     if not (shared.powers or shared.exponents or shared.conditions or (alike and abs(one.coefficient) != 1)):
         return node
@@ -75,7 +70,7 @@ def _apart(node: If | Branch, tangents: frozenset[str]) -> Term:
         shared.coefficient = max(one.coefficient, other.coefficient)
     elif one.coefficient < 0 and other.coefficient < 0:
         shared.coefficient = Fraction(-1)
-    sides = [written(_without(side, shared), tangents) for side in (one, other)]
+    sides = [written(side.without(shared), tangents) for side in (one, other)]
     choice = sides[0] if sides[0] == sides[1] else _choosing(node, *sides)
     shared.times(choice, 1)
     return written(shared, tangents)
@@ -113,15 +108,6 @@ def _chosen(term: Term, tangents: frozenset[str]) -> tuple[If | Branch | None, T
 
 def _asked(choice: If | Branch) -> object:
     return choice.condition if isinstance(choice, If) else (choice.coordinates, choice.strict)
-
-
-def _without(found: Factors, shared: Factors) -> Factors:
-    rest = Factors(found.coefficient / shared.coefficient, dict(found.powers), [], [])
-    for base, n in shared.powers.items():
-        rest.times(base, -n)
-    rest.exponents = [e for e in found.exponents if e not in shared.exponents]
-    rest.conditions = [c for c in found.conditions if c not in shared.conditions]
-    return rest
 
 
 def _choosing(node: If | Branch, then: Term, orelse: Term) -> Term:

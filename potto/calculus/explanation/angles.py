@@ -10,7 +10,8 @@ from collections.abc import Callable
 from fractions import Fraction
 
 from potto.calculus.algebra.rational_form import normal
-from potto.calculus.explanation.factors import Factors, written
+from potto.calculus.explanation.factors import Factors
+from potto.calculus.explanation.products import written
 from potto.core.terms import ONE, PI, ZERO, Prim, Term, Var, add, const, div, mul, neg, pow_, prim, sub
 
 _TWO = const(2.0)

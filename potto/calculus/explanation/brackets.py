@@ -16,6 +16,7 @@ from msgspec import Struct
 
 from potto.calculus.algebra.ranges import Box, range_of
 from potto.calculus.algebra.rational_form import as_term, normal
+from potto.calculus.explanation.squares import root_of_square
 from potto.core.polynomials import Polynomial, number, shared_by, without
 from potto.core.printer import format_term
 from potto.core.terms import (
@@ -31,6 +32,7 @@ from potto.core.terms import (
     div,
     mul,
     neg,
+    pow_,
     prim,
     sub,
 )
@@ -61,11 +63,15 @@ def conditions(term: Term) -> list[Inequality] | None:
             found.append(Inequality(term.surface, term.strict))
             term = term.then
         elif term.then is ZERO:
-            found.append(Inequality(neg(term.surface), not term.strict))
+            found.append(Inequality(_turned(term.surface), not term.strict))
             term = term.orelse
         else:
             return None
     return found
+
+
+def _turned(surface: Term) -> Term:
+    return add(*map(neg, surface.args)) if isinstance(surface, Prim) and surface.op == "add" else neg(surface)
 
 
 def fewer(known: Iterable[Inequality], box: Box = _ANYWHERE) -> list[Inequality]:
@@ -138,6 +144,11 @@ def _bound(surface: Term) -> _Bound | None:
 
 def _surface(bound: _Bound) -> Term | None:
     """It, as what is added against what is taken away and the number."""
+    root = root_of_square(bound.of)
+    square = None if root is None else as_term(root)
+    if square is not None and (bare := number(bound.number)) is not None:
+        whole = pow_(square, const(2.0))
+        return sub(bare, whole) if bound.turned else sub(whole, bare)
     added = as_term({m: c for m, c in bound.of.items() if c > 0})
     taken = as_term({m: -c for m, c in bound.of.items() if c < 0} | ({(): bound.number} if bound.number else {}))
     if added is None or taken is None:
@@ -189,13 +200,18 @@ def constant(term: Term) -> Fraction | None:
 
 
 def opposite(first: Inequality, second: Inequality) -> bool:
+    """Whether one surface is above 0 where the other is below it."""
+    return first.strict and second.strict and _is_turned(first, second)
+
+
+def _is_turned(first: Inequality, second: Inequality) -> bool:
     """Whether one surface is the other with its sign turned."""
     found = normal(add(first.surface, second.surface))
-    return first.strict and second.strict and found is not None and not found.top
+    return found is not None and not found.top
 
 
 def two_sides(term: Term) -> Term | None:
-    """u, where a term is [u > 0] - [u < 0]."""
+    """u, where a term is [u > 0] - [u < 0], but where u is 0."""
     match term:
         case Prim(op="add", args=(first, Prim(op="neg", args=(second,)))):
             pass
@@ -204,7 +220,7 @@ def two_sides(term: Term) -> Term | None:
         case _:
             return None
     match conditions(first), conditions(second):
-        case [one], [other] if opposite(one, other):
+        case [one], [other] if _is_turned(one, other):
             return one.surface
         case _:
             return None
@@ -228,7 +244,20 @@ def _plain(item: Inequality, box: Box) -> list[Inequality]:
         return bounds
     if len(found.top) == 1:
         return _without_even(item, found.top, found.below, box)
+    if item.strict and set(found.below) == {()}:
+        return _without_shared(item, found.top, box)
     return [item]
+
+
+def _without_shared(item: Inequality, top: Polynomial, box: Box) -> list[Inequality]:
+    """Without what all summands share where it is above 0 or a square, and nothing where the rest is a square too."""
+    shared = shared_by(list(top))
+    known = {a: n for a, n in shared.items() if n % 2 == 0 or range_of(a, box).lo >= 0}
+    rest = {without(m, known): c for m, c in top.items()} if known else top
+    if root_of_square(rest) is not None:
+        return []
+    left = as_term(rest) if known else None
+    return [item] if left is None else [Inequality(left, True)]
 
 
 def _squared(form: Polynomial, strict: bool, box: Box) -> list[Inequality] | None:

@@ -1,6 +1,6 @@
 """Numbers of a formula as a person would write them, where a computer has rounded.
 
-Owns `in_decimals` and `root_of_number`.
+Owns `in_decimals`, `over_whole_numbers` and `root_of_number`.
 """
 
 from __future__ import annotations
@@ -8,7 +8,8 @@ from __future__ import annotations
 from fractions import Fraction
 from math import isfinite, isqrt, prod, ulp
 
-from potto.core.terms import Const, Prim, Term, const, mul, transform
+from potto.core.numerals import simple_fraction
+from potto.core.terms import Const, Prim, Term, const, div, mul, transform
 
 _DIGITS = 15  # of a number that may have been rounded
 
@@ -29,6 +30,21 @@ def in_decimals(term: Term) -> Term:
                 return const(-value)
             case Prim(op="neg", args=(Prim(op="mul", args=(Const(name=None, value=value), *rest)),)) if value < 0:
                 return mul(const(-value), *rest)
+            case _:
+                return new
+
+    return transform(term, change)
+
+
+def over_whole_numbers(term: Term) -> Term:
+    """The same term without fractions below the line: 5*x/12 for x/(12/5)."""
+
+    def change(_: Term, new: Term) -> Term:
+        match new:
+            case Prim(op="div", args=(top, Const(name=None, value=value))) if (
+                below := simple_fraction(value)
+            ) is not None:
+                return div(mul(const(float(below.denominator)), top), const(float(below.numerator)))
             case _:
                 return new
 

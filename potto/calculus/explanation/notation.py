@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable
 
 from msgspec import Struct
 
-from potto.calculus.explanation.decimals import in_decimals
+from potto.calculus.explanation.decimals import in_decimals, over_whole_numbers
 from potto.calculus.explanation.fields import fields_of
 from potto.core.numerals import Numbers
 from potto.core.printer import format_equation, format_term
@@ -33,7 +33,8 @@ class Notation(Struct, frozen=True):
 
     def text(self, term: Term) -> str:
         """A term whose fields have their names."""
-        return format_term(term, numbers=self.numbers)
+        whole = over_whole_numbers(term) if self.numbers is Numbers.FRACTIONS else term
+        return format_term(whole, numbers=self.numbers)
 
     def equation(self, surface: Term, variables: Iterable[str] = ()) -> str:
         """Where a surface is, as people write it: `x = t` for t - x, where x is one of the variables."""

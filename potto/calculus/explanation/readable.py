@@ -7,26 +7,31 @@ tangents, in which it is linear, and a product in the order of a textbook: numbe
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from fractions import Fraction
 from math import gcd, inf, isfinite, lcm
 
 from msgspec import Struct
 
-from potto.calculus.algebra.ranges import Box, ValueRange, range_of
+from potto.calculus.algebra.ranges import Box, range_of
 from potto.calculus.algebra.rational_form import Rational, normal
-from potto.calculus.explanation.alternatives import holds, in_one, sums_of_choices
+from potto.calculus.explanation.alternatives import in_one, sums_of_choices
 from potto.calculus.explanation.angles import at_angle, length
-from potto.calculus.explanation.brackets import Inequality, between, conditions, fewer, plainer
+from potto.calculus.explanation.brackets import Inequality, between, conditions, fewer
 from potto.calculus.explanation.brackets import bracket as bracket_of
+from potto.calculus.explanation.common_factors import collected, taken_out
+from potto.calculus.explanation.decided import decided, side_taken
 from potto.calculus.explanation.decimals import root_of_number
-from potto.calculus.explanation.factors import Factors, added, factored, is_negative, is_tangent, with_one_root, written
-from potto.calculus.explanation.signs import sign_of_product, sums_of_signs
-from potto.calculus.surfaces.branch_assignment import box_of, with_index
+from potto.calculus.explanation.factors import Factors, factored
+from potto.calculus.explanation.in_front import in_front
+from potto.calculus.explanation.products import added, is_negative, is_tangent, with_one_root, written
+from potto.calculus.explanation.signs import of_two, sign_of_product, size_of_product, sums_of_signs
+from potto.calculus.explanation.squares import root_of_square
 from potto.core.polynomials import Monomial, Polynomial, shared_by, without
 from potto.core.printer import LEFT_OUT, format_term
 from potto.core.terms import (
     ONE,
+    PI,
     ZERO,
     Array,
     Branch,
@@ -37,7 +42,7 @@ from potto.core.terms import (
     Prim,
     Sum,
     Term,
-    Var,
+    Tuple,
     add,
     branch,
     children,
@@ -55,10 +60,8 @@ from potto.core.terms import (
     substitute,
     transform,
     var,
-    with_integrand,
 )
 
-_Binder = Integral | Sum | Array | Fold
 _ARITHMETIC = ("add", "neg", "mul", "div", "pow", "sqrt", "exp")
 _LONG = 100_000  # characters of a formula of which nobody will read what can be made, beyond which nothing is tried
 _MANY = 60  # nodes of what is expanded
@@ -69,11 +72,13 @@ _SUM = "sum'"  # the name of a sum while it is not taken apart: one that nobody 
 
 class ReadableParts(Struct):
     """Of formulas that are written one after the other. known: what was found for a part of one, by all that this
-    depends on; factors: of atoms; pause: called before each new part, may raise what ends it."""
+    depends on; factors: of atoms; products: that sums are; pause: called before each new part, may raise what ends
+    it."""
 
     pause: Callable[[], None] = lambda: None
     known: dict[tuple[Term, frozenset[str], frozenset[str]], Term] = {}
     factors: dict[Term, Factors] = {}
+    products: dict[tuple[Term, frozenset[str], frozenset[str]], Factors | None] = {}
 
 
 def readable(
@@ -85,63 +90,13 @@ def readable(
         return term
     integers = frozenset(node.variable for node in postorder(term) if isinstance(node, Sum | Array | Fold))
     work = _Work(tangents, _bound(term) | frozenset(box or ()), integers, progress or ReadableParts())
-    found = _decided(transform(term, lambda _, new: work.node(new)), box or {}, work)
+    found = decided(transform(term, lambda _, new: work.node(new)), box or {}, work.node)
     return transform(found, lambda _, new: with_one_root(new))
 
 
 def _bound(term: Term) -> frozenset[str]:
     """The variables of the integrals in a term."""
     return frozenset(name for node in postorder(term) if isinstance(node, Integral) for name in node.variables)
-
-
-def _decided(term: Term, box: Box, work: _Work) -> Term:
-    """Without the brackets, and sizes of what has one sign, that are told by the ranges of the variables and indices
-    around them."""
-    known: dict[Term, Term] = {}
-    for node in postorder(term, below=lambda n: () if isinstance(n, _Binder) else children(n)):
-        known[node] = _inside(node, box, work) if isinstance(node, _Binder) else _undecided(node, known, box, work)
-    return known[term]
-
-
-def _inside(node: _Binder, box: Box, work: _Work) -> Term:
-    match node:
-        case Integral():
-            inner: Box = {**box, **box_of(node)}
-        case Array():
-            inner = with_index(box, node.variable, ZERO, sub(node.size, ONE))
-        case _:
-            inner = with_index(box, node.variable, node.lo, node.hi)
-    *parts, body = children(node)
-    return work.node(rebuild(node, (*(_decided(part, box, work) for part in parts), _decided(body, inner, work))))
-
-
-def _undecided(node: Term, known: Mapping[Term, Term], box: Box, work: _Work) -> Term:
-    parts = children(node)
-    new = rebuild(node, tuple(known[part] for part in parts)) if parts else node
-    if isinstance(new, Prim) and new.op == "abs":
-        bounds = range_of(new.args[0], box)
-        new = new.args[0] if bounds.lo >= 0 else neg(new.args[0]) if bounds.hi <= 0 else new
-    if isinstance(new, If) and (known_side := holds(new.condition, box)) is not None:
-        return new.then if known_side else new.orelse
-    if isinstance(new, Branch) and new.then is new.orelse:
-        return new.then
-    if isinstance(new, Branch):
-        taken = _taken(new, range_of(new.surface, box))
-        if taken is not None:
-            return taken
-        if len(new.coordinates) == 1 and (surface := plainer(new.surface, box)) is not None:
-            new = branch((surface,), new.strict, new.then, new.orelse)
-        held = conditions(new) if box else None
-        if held is not None and set(plain := fewer(held, box)) != set(held):
-            new = bracket_of(plain)
-    return new if new is node else work.node(new)
-
-
-def _taken(node: Branch, bounds: ValueRange) -> Term | None:
-    """The side of a branch whose surface has these bounds, where they tell."""
-    if bounds.positive or (not node.strict and bounds.lo >= 0):
-        return node.then
-    return node.orelse if bounds.negative or (node.strict and bounds.hi <= 0) else None
 
 
 class _Work:
@@ -165,21 +120,25 @@ class _Work:
                     self.progress.pause()
                     self.progress.known[key] = self._shortest(node)
                 return self.progress.known[key]
-            case Branch(coordinates=(If(condition=here, then=side, orelse=surface),)):
-                taken = _taken(node, range_of(side))
-                return node if taken is None else if_(here, taken, self.node(
-                    branch((surface,), node.strict, node.then, node.orelse)))  # fmt: skip
             case Branch():
+                if (whole := self._by_choice(node)) is not None:
+                    return whole
                 known = conditions(node)
                 if known is not None:
                     return bracket_of(fewer(known))
                 if len(node.coordinates) > 1:
                     return in_one(node, self.tangents, self.inside, self._cost)
+                if ZERO in (node.then, node.orelse) and not isinstance(node.then, Tuple):
+                    return self._by_bracket(node)
                 (item,) = between([Inequality(node.surface, node.strict)])
                 whole = branch((item.surface,), item.strict, node.then, node.orelse)
                 return in_one(whole, self.tangents, self.inside, self._cost) if isinstance(whole, Branch) else whole
             case Prim(op="sign"):
                 return sign_of_product(node)
+            case Prim(op="abs"):
+                return size_of_product(at_angle(node, self.integers))
+            case Prim(op="min" | "max"):
+                return of_two(node, self.node)
             case Prim():
                 return at_angle(node, self.integers)
             case Sum(lo=Const(value=lo), hi=Const(value=hi)) if hi <= lo:
@@ -187,9 +146,33 @@ class _Work:
             case If():
                 return in_one(node, self.tangents, self.inside, self._cost)
             case Integral():
-                return self._in_front(self._over_few(node))
+                few = self._over_few(node)
+                return in_front(few, self._factored(few.body), self.tangents) if isinstance(few, Integral) else few
             case _:
                 return node
+
+    def _by_bracket(self, node: Branch) -> Term:
+        """What is 0 on one side as a product."""
+        sides, other = ((ONE, ZERO), node.then) if node.orelse is ZERO else ((ZERO, ONE), node.orelse)
+        return self.node(mul(other, branch(node.coordinates, node.strict, *sides)))
+
+    def _by_choice(self, node: Branch) -> Term | None:
+        """A branch whose surface is a choice, as a choice between its sides, where one of these has a known sign."""
+        turned = isinstance(node.surface, Prim) and node.surface.op == "neg"
+        choice = children(node.surface)[0] if turned else node.surface
+        if len(node.coordinates) > 1 or not isinstance(choice, If | Branch):
+            return None
+        surfaces = [neg(side) if turned else side for side in (choice.then, choice.orelse)]
+        sides = [side_taken(node, range_of(surface)) for surface in surfaces]
+        if sides == [None, None]:
+            return None
+        then, orelse = (
+            self.node(branch((surface,), node.strict, node.then, node.orelse)) if side is None else side
+            for surface, side in zip(surfaces, sides, strict=True)
+        )
+        if isinstance(choice, If):
+            return if_(choice.condition, then, orelse)
+        return self.node(branch(choice.coordinates, choice.strict, then, orelse))
 
     def _over_few(self, node: Integral) -> Term:
         """An integral over the variables that something in it depends on, times the lengths of the others."""
@@ -207,38 +190,59 @@ class _Work:
         variables, bounds, hints = zip(*left, strict=True)
         return self.node(integral(variables, bounds, body, hints))
 
-    def _in_front(self, node: Term) -> Term:
-        """An integral with the number, the tangents and the names that its integrand is a multiple of in front."""
-        if not isinstance(node, Integral):
-            return node
-        found = self._factored(node.body)
-        still = {base: n for base, n in found.powers.items() if base.free.isdisjoint(node.variables)}
-        fixed = {base: n for base, n in still.items() if n > 0 and n.denominator == 1
-                 and (isinstance(base, Var) or is_tangent(base, self.tangents))}  # fmt: skip
-        if not fixed and found.coefficient == 1:
-            return node
-        rest = {base: n for base, n in found.powers.items() if base not in fixed}
-        inner = written(Factors(Fraction(1), rest, found.exponents, found.conditions), self.tangents)
-        whole = Factors(found.coefficient, {with_integrand(node, inner): 1, **fixed}, [], [])
-        return written(whole, self.tangents)
-
     def _shortest(self, node: Prim) -> Term:
         """The shortest of: the product of its factors, and the node expanded, with the sums in it or around them."""
         match node.op:
             case "add":
-                forms = [node, *sums_of_signs(node, self.tangents, self.inside), *self._choices(node)]
+                forms = [node, *sums_of_signs(node, self.tangents, self.inside, self.node), *self._choices(node)]
+                forms += collected(node, self._factored, self.node, self.tangents)
             case "sqrt":
                 forms = [written(factored(node), self.tangents), *self._of_squares(node)]
             case _:
-                forms = [written(factored(node), self.tangents)]
+                forms = [self._with_sums_as_products(node), written(factored(node), self.tangents)]
         if sum(1 for _ in postorder(node)) <= _MANY:
             whole, sums = self._with_sums_named(node)
             for form, named in ((node, []), (whole, sums)) if sums else ((node, sums),):
                 found = normal(form)
                 if found is not None and len(found.top) <= _SUMMANDS:
-                    forms += [self._put_back(each, named) for each in self._expanded(found)]
+                    expanded = [self._put_back(each, named) for each in self._expanded(found)]
+                    below = self._roots_below(node)
+                    forms += [each for each in expanded if self._roots_below(each) <= below]
         forms = list(dict.fromkeys(forms))
         return forms[0] if len(forms) == 1 else min(forms, key=self._cost)
+
+    def _roots_below(self, node: Term) -> frozenset[Term]:
+        """What all of a term divides by the roots of: of a + b/sqrt(t) nothing, so that where b is said to be 0 the a
+        is asked for at a negative t as well."""
+        if isinstance(node, Prim) and node.op == "add":
+            return frozenset.intersection(*map(self._roots_below, node.args))
+        powers = self._factored(node).powers.items()
+        return frozenset(base for base, n in powers if n < 0 and n.denominator > 1 and not range_of(base).positive)
+
+    def _with_sums_as_products(self, node: Term) -> Term:
+        """A product, sums in it as products where their summands share a factor."""
+        whole = factored(node)
+        found = Factors(whole.coefficient, {}, list(whole.exponents), list(whole.conditions))
+        for base, exponent in whole.powers.items():
+            inner = self._product_of(base) if exponent.denominator == 1 else None
+            if inner is None or (exponent < 0 and inner.conditions):
+                found.times(base, exponent)
+                continue
+            found.coefficient *= inner.coefficient ** int(exponent)
+            found.exponents += [mul(const(float(exponent)), each) for each in inner.exponents]
+            found.conditions += inner.conditions
+            for factor, n in inner.powers.items():
+                found.times(factor, n * exponent)
+        return written(found, self.tangents)
+
+    def _product_of(self, base: Term) -> Factors | None:
+        """A sum as a product, if its summands share a factor."""
+        if not isinstance(base, Prim) or base.op != "add":
+            return None
+        known = self.progress.products
+        if (base, self.tangents, self.inside) not in known:
+            known[base, self.tangents, self.inside] = taken_out(base.args, self._factored, self.node, self.tangents)
+        return known[base, self.tangents, self.inside]
 
     def _choices(self, node: Prim) -> Iterator[Term]:
         """Sums by the sides of a choice in them, which leave a product where one side comes to 0."""
@@ -338,6 +342,9 @@ class _Work:
         common = tuple(shared.items())
         whole = self._product(scale, (common, 1), *([(((inner, 1),), 1)]), (under, -1))
         apart = [self._product(c * scale, (m, 1), (common, 1), (under, -1)) for m, c in rest.items()]
+        root = None if PI in shared else root_of_square(rest)  # (2*pi*k + pi/6)^2 is read as it is
+        if root is not None:
+            return [self._product(scale, (common, 1), (((self._sum(root), 2),), 1), (under, -1)), whole, added(apart)]
         return [whole, added(apart)]
 
     def _around_tangents(self, form: Polynomial) -> Term:

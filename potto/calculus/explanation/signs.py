@@ -1,16 +1,18 @@
-"""Signs in a formula: of products, and those that a sum of two brackets is.
+"""Signs in a formula: of products, and those that a sum of two brackets is; sizes, and which of two is the larger.
 
-Owns `sign_of_product` and `sums_of_signs`.
+Owns `sign_of_product`, `sums_of_signs`, `size_of_product` and `of_two`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from fractions import Fraction
 
 from potto.calculus.algebra.ranges import range_of
-from potto.calculus.explanation.brackets import opposite
-from potto.calculus.explanation.factors import Factors, added, factored, is_negative, is_parity, written
-from potto.core.terms import Prim, Term, mul, neg, prim
+from potto.calculus.explanation.brackets import constant, opposite
+from potto.calculus.explanation.factors import Factors, factored, is_parity
+from potto.calculus.explanation.products import added, is_negative, written
+from potto.core.terms import Prim, Term, add, mul, neg, prim, sub
 
 
 def sign_of_product(node: Prim) -> Term:
@@ -33,18 +35,52 @@ def sign_of_product(node: Prim) -> Term:
     return neg(whole) if turned else whole
 
 
-def sums_of_signs(node: Prim, tangents: frozenset[str], inside: frozenset[str]) -> Iterator[Term]:
+def size_of_product(node: Term) -> Term:
+    """abs of a product: what is known to be above 0 stands before it, 3*abs(c)/4 for abs(3*c/4)."""
+    if not isinstance(node, Prim) or node.op != "abs":
+        return node
+    found = factored(node.args[0])
+    if found.conditions or found.exponents or not found.coefficient:
+        return node
+    outside = {base: n for base, n in found.powers.items() if n % 2 == 0 or range_of(base).lo >= 0}
+    inside = {base: n for base, n in found.powers.items() if base not in outside}
+    if abs(found.coefficient) == 1 and not outside:
+        return node
+    size = prim("abs", written(Factors(Fraction(1), inside, [], []), frozenset()))
+    whole = Factors(abs(found.coefficient), {**outside, **({size: 1} if inside else {})}, [], [])
+    return written(whole, frozenset())
+
+
+def of_two(node: Prim, simpler: Callable[[Term], Term]) -> Term:
+    """The larger or the smaller of two terms, where one of them always is; of c and -c the size."""
+    if len(node.args) != 2:
+        return node
+    first, second = node.args
+    more = range_of(simpler(sub(first, second)))
+    if more.lo >= 0 or more.hi <= 0:
+        return first if (more.lo >= 0) == (node.op == "max") else second
+    if constant(add(first, second)) == 0:
+        size = size_of_product(prim("abs", second if is_negative(first) else first))
+        return size if node.op == "max" else neg(size)
+    return node
+
+
+def sums_of_signs(
+    node: Prim, tangents: frozenset[str], inside: frozenset[str], simpler: Callable[[Term], Term]
+) -> Iterator[Term]:
     """[u > 0] - [u < 0] as the sign of u; inside: variables on which no sign may depend."""
     parts = [factored(arg) for arg in node.args]
     for i, first in enumerate(parts):
         for j in range(i + 1, len(parts)):
-            found = _sign(first, parts[j], tangents, inside)
+            found = _sign(first, parts[j], tangents, inside, simpler)
             if found is not None:
                 yield added([found, *(a for k, a in enumerate(node.args) if k not in (i, j))])
                 return
 
 
-def _sign(first: Factors, second: Factors, tangents: frozenset[str], inside: frozenset[str]) -> Term | None:
+def _sign(
+    first: Factors, second: Factors, tangents: frozenset[str], inside: frozenset[str], simpler: Callable[[Term], Term]
+) -> Term | None:
     same = first.powers == second.powers and first.exponents == second.exponents
     if not same or first.coefficient != -second.coefficient:
         return None
@@ -58,7 +94,7 @@ def _sign(first: Factors, second: Factors, tangents: frozenset[str], inside: fro
     found = Factors(first.coefficient, dict(first.powers), list(first.exponents), kept)
     positive, turned = (one[0].surface, 1) if not is_negative(one[0].surface) else (other[0].surface, -1)
     found.coefficient *= turned
-    signs = factored(sign_of_product(prim("sign", positive)))
+    signs = factored(sign_of_product(prim("sign", simpler(positive))))
     found.coefficient *= signs.coefficient
     for base, n in signs.powers.items():
         found.times(base, n)

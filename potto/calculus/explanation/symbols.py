@@ -185,8 +185,12 @@ def without_guards(term: Term) -> Term:
 
 def _factored(node: Term) -> Term:
     """What is 0 elsewhere as a product with a bracket."""
-    if isinstance(node, Branch) and node.orelse is ZERO and node.then is not ONE and not isinstance(node.then, Tuple):
+    if not isinstance(node, Branch) or isinstance(node.then, Tuple):
+        return node
+    if node.orelse is ZERO and node.then is not ONE:
         return mul(branch(node.coordinates, node.strict, ONE, ZERO), node.then)
+    if node.then is ZERO and node.orelse is not ONE and len(node.coordinates) == 1:
+        return mul(branch(node.coordinates, node.strict, ZERO, ONE), node.orelse)
     return node
 
 

@@ -1,7 +1,7 @@
 """Recursions written out for the values at hand, before derivatives are taken of them.
 
-Owns `recursions_unrolled`. The jumps of a recursion are seen once its calls are carried out as deep as they go: then the
-deltas of its derivative are those of a formula.
+Owns `recursions_unrolled`. The jumps of a recursion are seen once its calls are carried out as deep as they go: then
+the deltas of its derivative are those of a formula.
 """
 
 from __future__ import annotations
