@@ -1,6 +1,7 @@
 """Numbers of a term as text: as they are stored, or as the program around them would have them.
 
-Owns `Numbers`, `numeral`, `decimal` and `simple_fraction`. A term has a number alone, 0.5, whichever way it was written or came about.
+Owns `Numbers`, `numeral`, `decimal` and `simple_fraction`. A term has a number alone, 0.5, whichever way it was written
+or came about.
 """
 
 from __future__ import annotations

@@ -123,7 +123,7 @@ def test_names_of_roots_are_no_parameters_and_no_functions() -> None:
     ("program", "read"),
     [
         ("integral [-1, 1] [x^2 < t]*x^2 d(x)", "if [t >= 0 and t < 1] then sqrt(t)*dt else 0"),
-        ("integral [0, 3] [x^2 - 3*x + t < 0] d(x)", "-2*dt*[t > 0 and t < 9/4]/sqrt(9 - 4*t)"),
+        ("integral [0, 3] [x^2 - 3*x + t < 0] d(x)", "if [t > 0 and t < 9/4] then -2*dt/sqrt(9 - 4*t) else 0"),
     ],
 )
 def test_what_is_shorter_without_names_has_none(program: str, read: str) -> None:

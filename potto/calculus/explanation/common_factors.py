@@ -40,8 +40,7 @@ def taken_out(
 
 
 def _is_below_differently(base: Term, parts: Sequence[Factors]) -> bool:
-    powers = {part.powers[base] for part in parts if base in part.powers}
-    return len(powers) > 1 and min(powers) < 0
+    return len({n for part in parts if (n := part.powers.get(base, 0)) < 0}) > 1
 
 
 def collected(node: Prim, factored: Factored, simpler: Simpler, tangents: frozenset[str]) -> Iterator[Term]:

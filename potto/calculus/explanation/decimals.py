@@ -41,12 +41,11 @@ def over_whole_numbers(term: Term) -> Term:
 
     def change(_: Term, new: Term) -> Term:
         match new:
-            case Prim(op="div", args=(top, Const(name=None, value=value))) if (
-                below := simple_fraction(value)
-            ) is not None:
-                return div(mul(const(float(below.denominator)), top), const(float(below.numerator)))
-            case _:
-                return new
+            case Prim(op="div", args=(top, Const(name=None, value=value))):
+                below = simple_fraction(value)
+                if below is not None:
+                    return div(mul(const(float(below.denominator)), top), const(float(below.numerator)))
+        return new
 
     return transform(term, change)
 

@@ -10,7 +10,16 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from fractions import Fraction
 
-from potto.calculus.explanation.brackets import NEVER, Inequality, bracket, conditions, fewer, sign_where, two_sides
+from potto.calculus.explanation.brackets import (
+    NEVER,
+    Inequality,
+    bracket,
+    conditions,
+    fewer,
+    implies,
+    sign_where,
+    two_sides,
+)
 from potto.calculus.explanation.factors import Factors, as_number, factored, is_parity, shortest
 from potto.core.polynomials import Exact, number
 from potto.core.printer import format_term
@@ -47,6 +56,13 @@ _LARGEST_DIVISOR = 1000
 def _tidied(known: Factors) -> Factors:
     found = Factors(known.coefficient, dict(known.powers), known.exponents, fewer(known.conditions))
     for base, exponent in list(found.powers.items()):
+        if exponent.denominator == 1 and (decided := _where(found.conditions, base)) is not None:
+            found.times(base, -exponent)
+            inner = factored(decided)
+            found.coefficient *= inner.coefficient ** int(exponent)
+            for factor, n in inner.powers.items():
+                found.times(factor, n * exponent)
+            continue
         if isinstance(base, Const) and base.name is None and exponent.denominator == 2:
             value = Fraction(base.value)  # sqrt(2)/2 is 1/sqrt(2)
             other = any(n == -_HALF for n in found.powers.values())
@@ -60,6 +76,24 @@ def _tidied(known: Factors) -> Factors:
         if isinstance(base, Prim) and base.op == "abs" and exponent.denominator == 1:
             _sized(found, base, int(exponent))
     return found
+
+
+def _where(known: Sequence[Inequality], base: Term) -> Term | None:
+    """A sum without brackets that hold where all these conditions do, as what it comes to there; None if it has none
+    of these, or is no product of powers then."""
+    if not known or not isinstance(base, Prim) or base.op != "add":
+        return None
+    parts = list(map(factored, base.args))
+    pieces = []
+    for part in parts:
+        kept = [c for c in part.conditions if not any(implies(each, c) for each in known)]
+        if fewer([*known, *kept]) != [NEVER]:
+            pieces.append(Factors(part.coefficient, part.powers, part.exponents, kept))
+    if sum(len(piece.conditions) for piece in pieces) == sum(len(part.conditions) for part in parts):
+        return None
+    whole = add(*(written(piece, frozenset()) for piece in pieces))
+    inner = factored(whole)
+    return None if whole is ZERO or inner.exponents or inner.conditions else whole
 
 
 def _sized(found: Factors, size: Prim, exponent: int) -> None:
