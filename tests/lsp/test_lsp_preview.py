@@ -182,6 +182,22 @@ def test_a_pixel_leads_to_the_conditions_of_the_function_that_it_is_given(server
     assert [each["equation"] for each in seen["conditions"]] == ["y = 0.25", "t = x*(if [y < 0.25] then 1 else 2)"]
 
 
+def test_a_pixel_leads_to_the_conditions_of_a_function_without_an_integral(server: Server, uri: Uri) -> None:
+    """Of x^2 + y^2 < r^2 at (0.6, 0.5): 0.64 - 0.61 = 0.03 inside; over a pixel it changes by 0.1*(2*0.6 + 2*0.5), which
+    is 0.22. Of x < t, t - 0.6 = -0.3, which is 3 pixels; it stands in a function that is called."""
+    client = server()
+    text = "def side(x, t) [x < t]\ndef f(x, y, r, t) if [x^2 + y^2 < r^2] then 1 else side(x, t)\n"
+    client.open(uri("main"), text)
+    values = {"x": 0.6, "y": 0.5, "r": 0.8, "t": 0.3}
+    asked = {"textDocument": {"uri": uri("main")}, "name": "f", "values": values, "cell": {"x": 0.1, "y": 0.1}}
+    circle, side = client.answer(client.begin("potto/pixel", asked), 60)["result"]["conditions"]
+    assert (circle["side"], side["side"]) == (1, -1)
+    assert math.isclose(circle["pixels"], 0.03 / 0.22, rel_tol=1e-9)
+    assert math.isclose(side["pixels"], 3, rel_tol=1e-9)
+    assert circle["range"]["start"] == {"line": 1, "character": 22}
+    assert side["range"]["start"] == {"line": 0, "character": 16}
+
+
 def test_a_pixel_leads_to_the_conditions_behind_it(server: Server, uri: Uri) -> None:
     """Of x^2 + y^2 < r^2 at (0.35, 0.4), the middle: 0.25 - 0.1225 - 0.16 = -0.0325 outside; over a pixel it changes by
     0.1*(2*0.35 + 2*0.4) = 0.15, so it is 0.2167 pixels off. Of x < t: t - 0.35 = 0.25, which is 2.5 pixels."""

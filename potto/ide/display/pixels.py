@@ -46,18 +46,23 @@ class PixelCondition(Struct, frozen=True):
 @query
 def pixel_conditions(db: Database, file: str, name: str, given: Functions = ()) -> tuple[PixelCondition, ...]:
     """The conditions of a definition, and of functions that it is given, that depend on its parameters only, in the
-    order of the text."""
+    order of the text; those that are under no integral last."""
     if not is_sound(db, file, name):
         return ()
     elaborated = core(db, file, name)
     notation = written_notation(db, file, name)
     spans, params, middles = dict(elaborated.origins), parameters_of(elaborated.term), _middles(elaborated.term)
     shown = {(info.span, info.equation) for info in condition_infos(db, file, name, given) if not info.problem}
+    under = conditions(db, file, name, given)
+    known = {condition.written for condition in under}
+    beside = [c for c in conditions(db, file, name, given, params) if c.written not in known]
     found: dict[PixelCondition, None] = {}
-    for condition in conditions(db, file, name, given):
+    for condition in (*under, *beside):
         span, equation = spans.get(condition.anchor), shown_equation(condition.surface, condition.variables, notation)
         surface = _in_the_middle(condition.surface, middles)
-        if span is None or (span, equation) not in shown or surface.free - set(params):
+        if span is None or surface.free - set(params):
+            continue
+        if condition.written in known and (span, equation) not in shown:
             continue
         if any(isinstance(n, App) for n in postorder(surface)):
             continue

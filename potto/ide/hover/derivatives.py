@@ -6,7 +6,7 @@ coordinates of conditions with inverse and determinant. What is true is said by 
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Container, Iterable
 
 from msgspec import Struct
 
@@ -21,7 +21,7 @@ from potto.calculus.inlining.currying import parameters_of
 from potto.calculus.solving.inverse_map import InverseMap, invert
 from potto.checking.check import has_errors
 from potto.core.simplify import simplify
-from potto.core.terms import Deriv, Global, Hole, Lam, Term, global_, postorder
+from potto.core.terms import ONE, ZERO, Deriv, Global, Hole, Lam, Term, global_, integral, postorder
 from potto.elaborate import core, core_term, elaborate_expression
 from potto.ide.names.live_expressions import wrong_with
 from potto.modules import definition, dependencies, is_recursive, references
@@ -83,9 +83,11 @@ class ConditionInfo(Struct, frozen=True):
 Functions = tuple[tuple[str, str], ...]  # parameters that are functions, each with the text of what it is given
 
 
-def conditions(db: Database, file: str, name: str, given: Functions = ()) -> tuple[Condition, ...]:
+def conditions(
+    db: Database, file: str, name: str, given: Functions = (), over: Container[str] = ()
+) -> tuple[Condition, ...]:
     """The conditions of a sound definition, and those of functions that it is given. A text that is not a function of
-    the file, or not a sound one, has none."""
+    the file, or not a sound one, has none. over: parameters that vary too, as the axes of a picture do."""
     functions: dict[str, Term] = {}
     for parameter, text in given:
         if wrong_with(db, file, text):
@@ -95,11 +97,19 @@ def conditions(db: Database, file: str, name: str, given: Functions = ()) -> tup
         if isinstance(term, Lam | Global | Deriv) and all(is_sound(db, g.module, g.name) for g in names):
             functions[parameter] = term
     return conditions_of(
-        core(db, file, name).term,
+        _integrated(core(db, file, name).term, over),
         lambda g: exported(db, g.module, g.name),
         lambda g: core_term(db, g.module, g.name),
         functions,
     )
+
+
+def _integrated(term: Term, over: Container[str]) -> Term:
+    """The body of a function, those of its parameters integrated over."""
+    params = tuple(p for p in parameters_of(term) if p in over)
+    while isinstance(term, Lam):
+        term = term.body
+    return integral(params, ((ZERO, ONE),) * len(params), term) if params else term
 
 
 @query
