@@ -183,8 +183,8 @@ def test_a_pixel_leads_to_the_conditions_of_the_function_that_it_is_given(server
 
 
 def test_a_pixel_leads_to_the_conditions_of_a_function_without_an_integral(server: Server, uri: Uri) -> None:
-    """Of x^2 + y^2 < r^2 at (0.6, 0.5): 0.64 - 0.61 = 0.03 inside; over a pixel it changes by 0.1*(2*0.6 + 2*0.5), which
-    is 0.22. Of x < t, t - 0.6 = -0.3, which is 3 pixels; it stands in a function that is called."""
+    """Of x^2 + y^2 < r^2 at (0.6, 0.5): 0.64 - 0.61 = 0.03 inside; over a pixel it changes by 0.1*(2*0.6 + 2*0.5) =
+    0.22. Of x < t, t - 0.6 = -0.3, which is 3 pixels; it stands in a function that is called."""
     client = server()
     text = "def side(x, t) [x < t]\ndef f(x, y, r, t) if [x^2 + y^2 < r^2] then 1 else side(x, t)\n"
     client.open(uri("main"), text)
