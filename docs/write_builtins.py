@@ -10,9 +10,9 @@ from pathlib import Path
 
 import mpmath
 
+from potto.calculus.explanation.readable import formula
 from potto.core.printer import format_term
 from potto.core.reference import evaluate
-from potto.core.simplify import simplify
 from potto.core.terms import Term, var
 from potto.elaborate import elaborate_expression
 from potto.measures import COMPOSITIONS, MEASURES, Measure
@@ -124,7 +124,7 @@ def derivatives(entry: Primitive, arguments: tuple[str, ...]) -> str:
     if entry.partials is None:
         return ""
     slopes = entry.partials(*(var(a) for a in arguments if a != "..."))
-    return "<br>".join(code(format_term(simplify(slope))) for slope in slopes)
+    return "<br>".join(code(formula(slope)) for slope in slopes)
 
 
 MEASURE_INTRODUCTION = """## Measures
@@ -164,7 +164,7 @@ def measure_table() -> str:
         cells = (
             code(f"{name}({', '.join(entry.parameters)})"),
             entry.doc,
-            code(format_term(simplify(entry.density(var("x"), *terms)))),
+            code(formula(entry.density(var("x"), *terms))),
             code(f"[{format_term(lo)}, {format_term(hi)}]"),
             conditions(entry, terms),
             *shown(entry.example),

@@ -11,12 +11,12 @@ from fractions import Fraction
 from math import isfinite
 
 _LARGEST = 64  # of what a person divides by
-_POWERS_OF_TEN = [10.0**n for n in range(1, 16)]
+_FEW = 8  # digits of a decimal that a person writes
 
 
 class Numbers(Enum):
     """How numbers that are not whole are written: 0.5 as it is stored, 1/2 where a program has whole numbers alone, and
-    where it has decimals 0.1 for one tenth too."""
+    where it has decimals 0.1 for a tenth too."""
 
     STORED = "stored"
     FRACTIONS = "fractions"
@@ -38,5 +38,8 @@ def simple_fraction(value: float) -> Fraction | None:
 
 
 def decimal(top: float, below: float) -> float | None:
-    """The value of a quotient that people write as a decimal, of a whole number by a power of ten; None for others."""
-    return top / below if top.is_integer() and below in _POWERS_OF_TEN else None
+    """The value of a quotient of whole numbers if it is a decimal of few digits, 0.64 for 16/25; None for others."""
+    if not (top.is_integer() and below.is_integer() and below):
+        return None
+    text = repr(top / below)
+    return float(text) if len(text) <= _FEW and Fraction(text) == Fraction(top) / Fraction(below) else None

@@ -106,6 +106,7 @@ TENTH = prim("div", ONE, const(10.0))
         (const(1e-300), "1e-300", "1e-300"),
         (INF, "inf", "inf"),
         (TENTH, "1/10", "0.1"),
+        (prim("div", const(16.0), const(25.0)), "16/25", "0.64"),
         (prim("div", const(3.0), const(7.0)), "3/7", "3/7"),
         (add(div(pow_(x, HALF), y), pow_(HALF, x)), "x^(1/2)/y + (1/2)^x", "x^0.5/y + 0.5^x"),
         (prim("div", x, HALF), "x/(1/2)", "x/0.5"),

@@ -1,8 +1,9 @@
 """The shortest way to write a derivative that is found: like terms collected, fractions joined, brackets made plain.
 
-Owns `readable`, the one home of what a shown formula is simplified by; `core.simplify` keeps values everywhere and
-rewrites little. Here values are the same wherever both forms are defined, up to rounding. A sum is written around its
-tangents, in which it is linear, and a product in the order of a textbook: numbers, factors, tangents, brackets, deltas.
+Owns `readable` and `formula`, the one home of what a shown formula is simplified by; `core.simplify` keeps values
+everywhere and rewrites little. Here values are the same wherever both forms are defined, up to rounding. A sum is
+written around its tangents, in which it is linear, and a product in the order of a textbook: numbers, factors,
+tangents, brackets, deltas.
 """
 
 from __future__ import annotations
@@ -21,14 +22,16 @@ from potto.calculus.explanation.brackets import Inequality, between, conditions,
 from potto.calculus.explanation.brackets import bracket as bracket_of
 from potto.calculus.explanation.common_factors import collected, taken_out
 from potto.calculus.explanation.decided import decided, side_taken
-from potto.calculus.explanation.decimals import root_of_number
+from potto.calculus.explanation.decimals import over_whole_numbers, root_of_number
 from potto.calculus.explanation.factors import Factors, factored
 from potto.calculus.explanation.in_front import in_front
 from potto.calculus.explanation.products import added, is_negative, is_tangent, with_one_root, written
 from potto.calculus.explanation.signs import of_two, sign_of_product, size_of_product, sums_of_signs
 from potto.calculus.explanation.squares import root_of_square
+from potto.core.numerals import Numbers
 from potto.core.polynomials import Monomial, Polynomial, shared_by, without
 from potto.core.printer import LEFT_OUT, format_term
+from potto.core.simplify import simplify
 from potto.core.terms import (
     ONE,
     PI,
@@ -92,6 +95,12 @@ def readable(
     work = _Work(tangents, _bound(term) | frozenset(box or ()), integers, progress or ReadableParts())
     found = decided(transform(term, lambda _, new: work.node(new)), box or {}, work.node)
     return transform(found, lambda _, new: with_one_root(new))
+
+
+def formula(term: Term) -> str:
+    """What stands in no program, as people write it: the density of a measure, the slope of a builtin."""
+    plain = over_whole_numbers(readable(simplify(term), frozenset()))
+    return format_term(plain, numbers=Numbers.FRACTIONS)
 
 
 def _bound(term: Term) -> frozenset[str]:

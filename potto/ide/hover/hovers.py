@@ -10,8 +10,9 @@ import inspect
 import os.path
 import re
 
+from potto.calculus.explanation.readable import formula
 from potto.checking.check import definition_diagnostics
-from potto.core.printer import format_equation, format_term
+from potto.core.printer import format_equation
 from potto.core.simplify import simplify
 from potto.core.terms import Branch, Term, var
 from potto.ide.hover.conditions import RULE, at_condition, condition_after
@@ -188,7 +189,7 @@ def _rule(primitive: Primitive) -> str:
     arguments = _arguments(primitive)
     parts = []
     for name, partial in zip(builtin_parameters(primitive), primitive.partials(*arguments)):
-        text = format_term(simplify(partial))
+        text = formula(partial)
         bracket = isinstance(partial, Branch) and text.startswith("[")
         whole = text if bracket or text.isidentifier() or _CALL.fullmatch(text) else f"({text})"
         parts.append(f"d{name}" if text == "1" else f"{whole}*d{name}")
@@ -209,8 +210,8 @@ def measure_markdown(name: str) -> str:
     parameters = tuple(var(p) for p in measure.parameters)
     lo, hi = measure.support(*parameters)
     facts = [
-        f"- density at x: {code(format_term(simplify(measure.density(var('x'), *parameters))))}",
-        f"- support: {code(f'[{format_term(simplify(lo))}, {format_term(simplify(hi))}]')}",
+        f"- density at x: {code(formula(measure.density(var('x'), *parameters)))}",
+        f"- support: {code(f'[{formula(lo)}, {formula(hi)}]')}",
         f"- mean: {_moment(measure.mean, parameters)}",
         f"- variance: {_moment(measure.variance, parameters)}",
     ]
@@ -224,7 +225,7 @@ def measure_signature(measure: Measure | Composition) -> str:
 
 
 def _moment(moment: object, parameters: tuple[Term, ...]) -> str:
-    return code(format_term(simplify(moment(*parameters)))) if callable(moment) else "does not exist"
+    return code(formula(moment(*parameters))) if callable(moment) else "does not exist"
 
 
 # Where there is no name
