@@ -58,9 +58,9 @@ def _tidied(known: Factors) -> Factors:
     for base, exponent in list(found.powers.items()):
         if exponent.denominator == 1 and (decided := _where(found.conditions, base)) is not None:
             found.times(base, -exponent)
-            inner = factored(decided)
-            found.coefficient *= inner.coefficient ** int(exponent)
-            for factor, n in inner.powers.items():
+            there = factored(decided)
+            found.coefficient *= there.coefficient ** int(exponent)
+            for factor, n in there.powers.items():
                 found.times(factor, n * exponent)
             continue
         if isinstance(base, Const) and base.name is None and exponent.denominator == 2:
@@ -81,7 +81,7 @@ def _tidied(known: Factors) -> Factors:
 def _where(known: Sequence[Inequality], base: Term) -> Term | None:
     """A sum without brackets that hold where all these conditions do, as what it comes to there; None if it has none
     of these, or is no product of powers then."""
-    if not known or not isinstance(base, Prim) or base.op != "add":
+    if not known or not isinstance(base, Prim) or base.op != "add" or two_sides(base) is not None:
         return None
     parts = list(map(factored, base.args))
     pieces = []
