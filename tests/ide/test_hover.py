@@ -295,8 +295,8 @@ def test_names_in_parentheses_are_bound_to_their_parts():
     ("name", "rule"),
     [
         ("abs", "d abs(x) = (if [x >= 0] then 1 else -1)*dx"),
-        ("clamp", " + (if [lo <= x] then [x >= hi] else [lo >= hi])*dhi"),
-        ("max", "d max(x, y) = [y <= x]*dx + [y > x]*dy"),
+        ("clamp", " + (if [lo <= x] then [hi <= x] else [hi <= lo])*dhi"),
+        ("max", "d max(x, y) = [y <= x]*dx + [x < y]*dy"),
         ("sin", "d sin(x) = cos(x)*dx"),
     ],
 )
