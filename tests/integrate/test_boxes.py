@@ -155,3 +155,27 @@ def ring(a, b, t) integral ([a, a + 1/64], [b, b + 1/64]) x*y*[sqrt(x^2 + y^2) <
     assert ring.converged
     assert abs(ring.value.sum() - 0.8**4 * (1 - 1 / 16) / 8) <= 1e-13  # int r^3 dr sin cos
     assert abs(ring.tangent.sum() - 0.8**3 * (1 - 1 / 16) / 2) <= 1e-11
+
+
+@pytest.mark.parametrize("backend", ["numpy", pytest.param("native", marks=needs_llvm)])
+@pytest.mark.parametrize("far", [0.3, 1e4, 1e6, 1e308])
+def test_what_is_narrow_at_a_corner_of_one_member_is_seen_by_its_nodes_or_its_corners(far: float, backend: str) -> None:
+    """All nodes of a long stretch may lie where exp(-x) is 0 to the last bit, and those of a pixel beside the one
+    corner where something is."""
+    m = potto.compile("""
+def tail(t) integral [0, t] exp(-x) d(x)
+def on_top(t, k) integral [0, t] (1 + k*exp(-k*x)) d(x)
+def corner(a, b) integral ([a, a + 1/16], [b, b + 1/16]) 1e10*exp(-1e5*(x + y)) d(x, y)
+""")
+    t = np.linspace(0.1, 0.9, 100)
+    t[41] = far
+    a, b = np.meshgrid(np.arange(16) / 16, np.arange(16) / 16)
+    with potto.settings(backend=backend):
+        tail, on_top, corner = m.tail(t), m.on_top(np.minimum(t, 0.9), 1e6), m.corner(a, b)
+    for found, exact in (
+        (tail, -np.expm1(-t)),
+        (on_top, np.minimum(t, 0.9) - np.expm1(-1e6 * np.minimum(t, 0.9))),
+        (corner, np.where(a + b > 0, 0.0, 1.0)),  # all others have less than exp(-6250) of it
+    ):
+        assert (np.abs(found.value - exact) <= found.error + 1e-15).all()
+        assert found.converged and found.error.max() <= 1e-10

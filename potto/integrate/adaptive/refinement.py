@@ -20,11 +20,9 @@ from potto.integrate.panels.iterated import siblings
 from potto.integrate.panels.panel_batch import PanelBatch
 from potto.integrate.pieces import Ends, Pieces
 from potto.integrate.rules import substitution
-from potto.integrate.rules.gauss import EPS
+from potto.integrate.rules.gauss import EPS, PEAK
 from potto.kernels.cells import Array, Bools, Ints
 
-# How much larger than at the nodes an integrand must be at an end of a segment to be taken for a peak.
-PEAK = 8.0
 # By how much rounding at an end may be more than what is kept track of, which leaves out what elementary functions err:
 # of 2,000 option prices, whose kinks are on the wrong side by so much, 1 in 100 was refined towards its kink for 40 ms.
 ROUNDED = 4.0

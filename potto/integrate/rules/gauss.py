@@ -17,6 +17,8 @@ from potto.kernels.cells import Array, Bools, Ints
 
 EPS = 2.0**-52
 AHEAD = 0.7
+# How many times larger than at all nodes an integrand must be at an end of their stretch to be taken for a peak there.
+PEAK = 8.0
 
 
 class GaussRule(Struct, frozen=True):

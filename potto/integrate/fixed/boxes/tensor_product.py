@@ -1,14 +1,15 @@
 """A product of Gauss rules over boxes that nothing cuts, by numpy.
 
 Owns `BoxIntegrand` and `integrated`. Of a polynomial the rule takes as many nodes per variable as its degree asks for;
-of anything else few, then more where the Legendre coefficients say that these were not enough. All nodes of so many
-boxes are evaluated at once. (`lowered.boxes` does the same by machine code.)
+of anything else few, then more where the Legendre coefficients say that these were not enough; at the corners nothing
+may be that no node has seen. All nodes of so many boxes are evaluated at once. (`lowered.boxes` does the same by
+machine code.)
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import cached_property, lru_cache
 
 import numpy as np
@@ -18,8 +19,8 @@ from potto.core.terms import Lam, Term
 from potto.integrate.columns import run_of
 from potto.integrate.fixed.lowered.box_text import NODE_ROUNDING
 from potto.integrate.fixed.straight import StraightIntegral
-from potto.integrate.pieces import Evaluator, Sums, components, gather
-from potto.integrate.rules.gauss import EPS, gauss, truncation
+from potto.integrate.pieces import Evaluator, Sums, components, gather, still
+from potto.integrate.rules.gauss import EPS, PEAK, gauss, truncation
 from potto.kernels.cells import Array, Bools, Cell, Ints, Value
 
 # Nodes per variable: first few, then more for the boxes that need them.
@@ -63,12 +64,13 @@ class Bounds(Struct, frozen=True):
 
 class Means(Struct, frozen=True):
     """Mean values over boxes, (m, 1 + k, B), of the integrand, of its size and of its own error, and per variable the
-    sizes of the Legendre coefficients along it, (m, 1 + k, n, B)."""
+    sizes of the Legendre coefficients along it, (m, 1 + k, n, B). largest: (m, B), the largest value at nodes."""
 
     number: Array
     most: Array
     own: Array
     along: list[Array]
+    largest: Array
 
 
 def integrated(
@@ -107,6 +109,12 @@ def _tensor(orders: tuple[int, ...]) -> tuple[tuple[Array, ...], tuple[Array, ..
     return tuple(g.reshape(-1, 1) for g in grids), tuple(reversed(weights))
 
 
+@lru_cache(maxsize=8)
+def _corners(count: int) -> tuple[Array, ...]:
+    """Those of the unit cube, (N, 1) for each variable."""
+    return tuple(g.reshape(-1, 1) for g in np.meshgrid(*[np.array([0.0, 1.0])] * count, indexing="ij"))
+
+
 def _at_nodes(
     face: BoxIntegrand, machine: Evaluator, env: dict[str, Value], bounds: Bounds, orders: tuple[int, ...]
 ) -> tuple[Sums, Bools]:
@@ -127,6 +135,8 @@ def _at_nodes(
             floor += mean.sum(axis=2) * (bounds.off[variable] / size[variable])
     asked = np.maximum(0.5 * machine.rtol * np.abs(number), 0.5 * machine.atol / volume)
     good: Bools = (error <= np.maximum(asked, 8 * floor)).all(axis=(0, 1))
+    if None in face.exact:
+        good &= (_at_corners(face, machine, env, low, size) <= PEAK * found.largest).all(axis=0)
     error += floor
     total, bound, most = number * volume, error * volume, most.max(axis=0) * volume
     gross = np.stack((most[0], most[1:].max(axis=0, initial=0.0)))
@@ -138,13 +148,11 @@ def _means(
 ) -> Means:
     """What the nodes of a rule amount to."""
     nodes, weights = _tensor(orders)
-    here, count = dict(env), low.shape[1]
-    for variable, x, a, b in zip(face.plan.variables, nodes, low, size, strict=True):
-        here[variable] = Cell(a + b * x, None, (None,) * machine.directions)
-    value = machine.evaluate(face.function, {name: here[name] for name in face.function.params}, None)
-    cells = components(value)
+    count = low.shape[1]
+    cells = _values(face, machine, env, low, size, nodes)
     shape = (len(cells), 1 + machine.directions)
     number, most, own = np.zeros((3, *shape, count))
+    largest = np.zeros((len(cells), count))
     along = [np.zeros((*shape, n, count)) for n in orders]
     for i, cell in enumerate(cells):
         for c, (values, off) in enumerate(zip((cell.v, *cell.t), (cell.e, *cell.et), strict=True)):
@@ -152,6 +160,8 @@ def _means(
                 continue
             h: Array = np.broadcast_to(values, (nodes[0].size, count))
             most[i, c] = weights[0] @ np.abs(h)
+            if c == 0:
+                largest[i] = np.abs(h).max(axis=0)
             if off is not None:
                 own[i, c] = weights[0] @ np.broadcast_to(off, h.shape)
             for n, rest, mean in zip(orders, weights[1:], along, strict=True):  # one after another, outermost first
@@ -160,4 +170,23 @@ def _means(
                 mean[i, c] = sizes[:, 0] if rest.size == 1 else rest @ sizes
                 h = coefficients[0].reshape(rest.size, count)
             number[i, c] = h[0]
-    return Means(number, most, own, along)
+    return Means(number, most, own, along, largest)
+
+
+def _values(
+    face: BoxIntegrand, machine: Evaluator, env: dict[str, Value], low: Array, size: Array, places: Sequence[Array]
+) -> list[Cell]:
+    """The integrand's numbers at places of the unit cube, (N, 1) for each variable, of all boxes."""
+    here = dict(env)
+    for variable, x, a, b in zip(face.plan.variables, places, low, size, strict=True):
+        here[variable] = Cell(a + b * x, None, (None,) * machine.directions)
+    return components(machine.evaluate(face.function, {name: here[name] for name in face.function.params}, None))
+
+
+def _at_corners(face: BoxIntegrand, machine: Evaluator, env: dict[str, Value], low: Array, size: Array) -> Array:
+    """The largest size of the integrand at the corners of boxes, (m, B), what is infinite or no number left out."""
+    nodes = _corners(len(low))
+    there = {name: still(value) for name, value in env.items()}
+    cells = _values(face, machine.with_directions(0), there, low, size, nodes)
+    sizes = np.abs([np.broadcast_to(cell.v, (nodes[0].size, low.shape[1])) for cell in cells])
+    return np.asarray(np.where(np.isfinite(sizes), sizes, 0.0).max(axis=1))

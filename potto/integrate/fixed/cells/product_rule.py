@@ -22,12 +22,10 @@ from potto.integrate.fixed.lowered.total_text import ELSEWHERE, TRACKED, TotalTe
 from potto.integrate.fixed.moving_sums import SUMMED
 from potto.integrate.fixed.straight import StraightIntegral
 from potto.integrate.pieces import Evaluator
-from potto.integrate.rules.gauss import analytic_truncation, telling
+from potto.integrate.rules.gauss import PEAK, analytic_truncation, telling
 from potto.kernels.cells import Array, Bools, Ints, Value
 
 STRAIGHT = (False, False)  # no end of a stretch is like a square root
-# How many times larger than at all nodes the integrand may be at the ends of stretches: else something narrow is there.
-PEAK = 8.0
 # A rule is good enough for a cell if what it may be off is this part of the accuracy asked for; for a few members, whom
 # more nodes cost next to nothing, this part of the number.
 SHARE, TIGHT = 0.01, 1e-13

@@ -14,11 +14,12 @@ from functools import reduce
 from msgspec import Struct
 
 from potto.core.terms import Lam, Term, Tuple, children, function_of
-from potto.integrate.fixed.lowered.formula_text import ParameterPlace, Symbol
+from potto.integrate.fixed.axes import ENDS
+from potto.integrate.fixed.lowered.formula_text import ParameterPlace, Symbol, still
 from potto.integrate.fixed.lowered.rule_text import RuleText
 from potto.integrate.fixed.straight import StraightIntegral
 from potto.integrate.pieces import Evaluator
-from potto.integrate.rules.gauss import EPS, gauss
+from potto.integrate.rules.gauss import EPS, PEAK, gauss
 from potto.integrate.rules.written_intervals import Names, WrittenInterval
 from potto.kernels.native.operations import NotStraight
 
@@ -74,6 +75,7 @@ class BoxText(RuleText):
         self.begin()
         self.added = [at.room(n * each) for n in self.orders]
         self.most, self.own = ([at.room(1) for _ in range(each)] for _ in range(2))
+        self.largest, self.peaks = ([at.room(1) for _ in range(each // self.k1)] for _ in range(2))
         here, columns = self.parameters(places, self.columns, int(self.look.known))
         ends = self.evaluated(self.look.bounds, here, self.machine)
         if any(end.e is not None or any(x is not None for x in end.t) for end in ends):
@@ -90,9 +92,12 @@ class BoxText(RuleText):
             self.face = function_of(face)
             for added, n in zip(self.added, self.orders, strict=True):
                 self.fill(added, str(n), each)
-            for room in (*self.most, *self.own):
+            for room in (*self.most, *self.own, *self.largest, *self.peaks):
                 at.store(self.zero, room)
-            self.results([x or self.zero for x in self.mean(0, here, self.one)], mask)
+            means = [x or self.zero for x in self.mean(0, here, self.one)]
+            if not all(self.exact):
+                self.at_corners(0, {name: still(symbol) for name, symbol in here.items()})
+            self.results(means, mask)
             at.end()
         return self.end()
 
@@ -186,7 +191,7 @@ class BoxText(RuleText):
         n, rows, _, nodes, _, weights, *_ = self.tables[i]
         j = at.begin(n)
         weight = at.apply("mul", outer, at.constant(weights, j))
-        node = at.apply("add", self.low[i], at.apply("mul", self.sizes[i], at.constant(nodes, j)))
+        node = self.between(i, at.constant(nodes, j))
         inner = {**env, self.plan.variables[i]: Symbol(node, None, (None,) * (self.k1 - 1), ())}
         values = self.values(inner, weight) if i + 1 == len(self.sizes) else self.mean(i + 1, inner, weight)
         moving = self.transformed(i, j, values)
@@ -212,7 +217,27 @@ class BoxText(RuleText):
         for size, room in zip((*sizes, *errors), (*self.most, *self.own), strict=True):
             if size is not None:
                 at.store(at.apply("add", at.load(room), at.apply("mul", weight, size)), room)
+        for room, size in zip(self.largest, sizes[:: self.k1], strict=True):
+            self.raise_to(room, size or self.zero)
         return found
+
+    def at_corners(self, i: int, env: dict[str, Symbol]) -> None:
+        """Note the largest sizes at the corners, by loops over the ends of variable i and those further in."""
+        at = self.at
+        end = self.spread(at.begin(str(ENDS)))
+        inner = {**env, self.plan.variables[i]: Symbol(self.between(i, end), None, (), ())}
+        if i + 1 < len(self.sizes):
+            self.at_corners(i + 1, inner)
+        else:
+            for room, cell in zip(
+                self.peaks, self.evaluated(self.face, inner, self.machine.with_directions(0)), strict=True
+            ):
+                self.raise_to(room, self.finite(at.apply("abs", cell.v)))
+        at.end()
+
+    def between(self, i: int, u: str) -> str:
+        """Where variable i is, at a place of [0, 1]."""
+        return self.at.apply("add", self.low[i], self.at.apply("mul", self.sizes[i], u))
 
     # What they amount to
 
@@ -245,6 +270,9 @@ class BoxText(RuleText):
             good = fine if good is None else at.apply("and", good, fine)
             bounds.append(at.apply("add", error, floor))
         assert good is not None
+        for peak, room in zip(self.peaks, self.largest, strict=True):
+            seen = at.apply("mul", at.number(PEAK), at.load(room))
+            good = at.apply("and", good, at.apply("le", at.load(peak), seen))
         most = [at.load(room) for room in self.most]
         gross = [most[::k1], [x for c, x in enumerate(most) if c % k1] or [self.zero]]
         rows = [*means, *bounds]
