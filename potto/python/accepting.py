@@ -136,7 +136,7 @@ def _batch(items: list[Any]) -> Any:
     """Numbers, or rows of them, as an array; with their errors where they are answers."""
     with contextlib.suppress(TypeError, ValueError):
         values = np.array(items)
-        if values.dtype.kind not in "fiuO" or not values.size:
+        if values.dtype.kind not in "fiuO":
             return items
         values = values.astype(float)
         errors = np.array([item.error for item in items if isinstance(item, Estimate)])

@@ -139,6 +139,19 @@ def _of_table(name: str, table: Any) -> Any:
     raise wrong_call(f"`{name}` has no value in {where}{more}", help)
 
 
+def must_not_be_masked(name: str, argument: Any) -> None:
+    """Raise PottoError for an array of numpy that hides some of its numbers: they would count like all others."""
+    if isinstance(argument, tuple):
+        for number, part in enumerate(argument):
+            must_not_be_masked(f"{name}.{number}", part)
+    if argument.__class__ is np.ndarray or not isinstance(argument, np.ndarray):
+        return  # without the import of what knows masks
+    if isinstance(argument, np.ma.MaskedArray) and np.ma.is_masked(argument):
+        where = ", ".join(map(str, np.argwhere(np.ma.getmaskarray(argument))[0]))
+        place = f"`{name}[{where}]`" if where else f"`{name}`"
+        raise wrong_call(f"{place} has no value: it is masked", "leave it out, or fill it in, `.filled(…)`")
+
+
 def _must_be_there(name: str, argument: list[Any], numbers: np.ndarray[Any, Any]) -> None:
     """Raise PottoError for None in a list: numpy makes nan of it, as of a number that is none."""
     if not np.isnan(numbers).any():

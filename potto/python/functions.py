@@ -32,7 +32,7 @@ from potto.python.arguments import (
     numbers_of,
     value_of,
 )  # fmt: skip
-from potto.python.arrays import has_arrays, with_arrays
+from potto.python.arrays import has_arrays, must_not_be_masked, with_arrays
 from potto.python.calls import Call, Form
 from potto.python.described import Doc, annotations_of, signature_of, typeset_derivative
 from potto.python.labels import Given, labelled
@@ -165,6 +165,7 @@ class Function(Travelling):
         sizes: dict[str, tuple[str, int]] = {}
 
         def taken(label: str, argument: Any, type: Type | None) -> Any:
+            must_not_be_masked(label, argument)
             argument = accepted(argument, type)
             if isinstance(argument, tuple | Mapping | list) and self._is_derivative():
                 argument = with_tangents(argument, type, _derived)

@@ -8,6 +8,7 @@ areas of polygons are finite sums).
 from __future__ import annotations
 
 import math
+import warnings
 from fractions import Fraction
 from typing import Any
 
@@ -252,3 +253,22 @@ def test_members_that_rounding_spoils_are_cut_once_in_each_order(monkeypatch: py
     assert len(seen) > 10 and len(seen) - len(set(seen)) <= 5
     for i in [*np.flatnonzero(~found.member_converged), *range(0, 4000, 200)]:
         assert abs(found.value[i] - covered_area([*pixel[:, i], *corners[:, i]])) <= found.error[i] + 1e-17
+
+
+@pytest.mark.parametrize("count", [3, 1000, 5000])
+def test_infinite_members_of_both_signs_beside_others(count: int) -> None:
+    """Each infinite one is told, all others are what they are alone, and numpy has nothing to warn of."""
+    f = potto.compile("def f(t) integral [0, t] exp(-x) d(x)").f
+    t = np.linspace(0.1, 0.9, count)
+    t[1:3] = math.inf, -math.inf
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        found = potto.grad(f)(t)
+    assert found.value[2] == -math.inf and found.tangent[2] == math.inf
+    fine = np.arange(count) != 2
+    assert (found.member_converged == fine).all()
+    value, error, slope, slope_error = (
+        part[fine] for part in (found.value, found.error, found.tangent, found.tangent_error)
+    )
+    assert (np.abs(value + np.expm1(-t[fine])) <= error).all()
+    assert (np.abs(slope - np.exp(-t[fine])) <= slope_error + 1e-18).all()

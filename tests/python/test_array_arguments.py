@@ -93,6 +93,19 @@ def test_arrays_and_batches_of_nothing(shape: tuple[int, ...]) -> None:
     assert np.shape(found["k"]) == shape[:-1]
 
 
+@pytest.mark.parametrize(("items", "shape"), [([], (0,)), ([[], []], (2, 0)), ((), None)])
+def test_an_empty_list_where_a_number_is_wanted_is_a_batch_of_nothing(
+    items: Any, shape: tuple[int, ...] | None
+) -> None:
+    f = potto.compile("def f(a, b) integral [0, 1] a*[x < b] d(x)").f
+    if shape is None:
+        with pytest.raises(potto.PottoError, match="a number is needed, not a tuple of 0"):
+            f(items, 0.5)
+        return
+    assert f(items, 0.5).value.shape == shape and f(items, 0.5).converged
+    assert [part.shape for part in potto.grad(f, wrt=["a", "b"])(items, 0.5).tangent] == [shape, shape]
+
+
 class Column:
     """What pandas gives for a column of a table, as far as it is asked."""
 
@@ -160,6 +173,16 @@ def test_an_answer_keeps_its_error_as_an_array() -> None:
         (lambda: MODULE.areas(np.ones((2, 3))), "tuples of 2"),
         (lambda: MODULE.total(np.ones((2, 3)), np.ones(4)), "do not broadcast"),
         (lambda: MODULE.total(np.array([True]), 1.0), "real numbers"),
+        (
+            lambda: MODULE.total(np.ma.array([1.0, 2.0, 3.0], mask=[0, 0, 1]), 1.0),
+            r"`xs\[2\]` has no value: it is masked",
+        ),
+        (
+            lambda: MODULE.total(np.ones(2), np.ma.array([[1.0, 2.0]], mask=[[0, 1]])),
+            r"`k\[0, 1\]` has no value: it is",
+        ),
+        (lambda: MODULE.total(np.ones(2), np.ma.masked), "`k` has no value: it is masked"),
+        (lambda: MODULE.areas((np.ma.array([1.0, 2.0], mask=[1, 0]), 1.0)), r"`ps.0\[0\]` has no value: it is masked"),
         (lambda: potto.jvp(MODULE.total, {"xs": np.ones(4)})(np.ones(3), 1.0), "an array of 3"),
         (lambda: potto.jvp(MODULE.total, (np.ones(3), 1.0), (np.ones(3), 0.0)), "as a dict by the names of parameters"),
         (lambda: potto.vjp(MODULE.scaled, np.ones(2), "xs")(np.ones(3), 1.0), "an array of 3"),

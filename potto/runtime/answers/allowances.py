@@ -177,7 +177,9 @@ def _left(term: Integral, sums: Sums, rtol: float, shape: tuple[int, ...]) -> Al
     within = np.broadcast_to(allowance(term, sums, rtol), sums.v.shape[-1:])
     kept: Bools = _everywhere(sums.e <= within) & _everywhere(sums.et <= within)
     finite: Bools = np.ones(kept.shape, dtype=bool)
-    if not math.isfinite(np.add.reduce(sums.v, None) + np.add.reduce(sums.t, None)):  # seldom, in large batches
+    with np.errstate(invalid="ignore"):  # inf - inf
+        total = np.add.reduce(sums.v, None) + np.add.reduce(sums.t, None)
+    if not math.isfinite(total):  # seldom, in large batches
         finite = _everywhere(np.isfinite(sums.v)) & _everywhere(np.isfinite(sums.t))
     if shape:
         return Allowance(*(part.reshape(shape) for part in (within, kept, finite)))
