@@ -90,14 +90,19 @@ class Replicates:
         """Note how much samples at neighbouring points differ, of which there is one in each of n equal parts."""
         if not blocks:
             return
-        places = np.concatenate([u for u, _ in blocks], axis=1)
-        n = places.shape[1]
-        at = np.minimum((places * n).astype(np.int64), n - 1)
-        for name in self.steps:
-            x = np.concatenate([self._apart(getattr(s, name)) for _, s in blocks], axis=-1)
-            ordered = np.empty_like(x)
-            np.put_along_axis(ordered, np.broadcast_to(at, x.shape), x, axis=-1)
-            self.steps[name] = self.steps[name] + np.abs(np.diff(ordered)).max(axis=(-1, -2), initial=0.0)
+        n = sum(u.shape[1] for u, _ in blocks)
+        values = {name: [self._apart(getattr(s, name)) for _, s in blocks] for name in self.steps}
+        largest = {name: np.zeros(parts[0].shape[:-2]) for name, parts in values.items()}
+        for row in range(self.count):  # one after the other: of all there are more than a cache holds
+            places = np.concatenate([u[row] for u, _ in blocks])
+            at = np.minimum((places * n).astype(np.int64), n - 1)
+            for name, parts in values.items():
+                ordered = np.empty((*largest[name].shape, n))
+                ordered[..., at] = np.concatenate([x[..., row, :] for x in parts], axis=-1)
+                steps = np.abs(np.diff(ordered)).max(axis=-1, initial=0.0)
+                largest[name] = np.maximum(largest[name], steps)
+        for name, most in largest.items():
+            self.steps[name] = self.steps[name] + most
 
     def _apart(self, x: Array) -> Array:
         return x.reshape(*x.shape[:-1], self.count, x.shape[-1] // self.count)
