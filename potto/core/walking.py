@@ -193,6 +193,8 @@ def replaced(root: Term, parts: Mapping[Term, Term]) -> Term:
 
 def unknown(root: Term, known: Container[Term], below: Callable[[Term], Sequence[Term]] = children) -> list[Term]:
     """The parts of a term that nothing is known of yet, children first: what is known is not gone into."""
+    if root in known:
+        return []
     order = postorder(root, below=lambda node: () if node in known else below(node))
     return [node for node in order if node not in known]
 

@@ -7,17 +7,27 @@ formulas of a root go over into each other.
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
+from functools import lru_cache
 
 from potto.core.terms import ONE, ZERO, Branch, If, Term, branch, children, if_, postorder, prim, rebuild, tuple_
 from potto.integrate.rules.complex_enclosures import enclosable
 
 
-def choices_of(cuts: Sequence[Term], written: Collection[Term], variables: Collection[str]) -> tuple[Term, ...]:
-    """What decides in cuts, each once: 1 or 0, as a condition of the parameters alone is met or not. written: the parts
-    of the program, which are none."""
-    solved = (node for node in postorder(*cuts) if node not in written)
-    found = (_met(node) for node in solved if isinstance(node, Branch | If))
+def choices_of(cuts: Sequence[Term], program: Sequence[Term], variables: Collection[str]) -> tuple[Term, ...]:
+    """What decides in cuts, each once: 1 or 0, as a condition of the parameters alone is met or not. Those that are
+    parts of the program are none."""
+    deciding = dict.fromkeys(node for cut in cuts for node in _deciding(cut))
+    if not deciding:
+        return ()
+    written = set(postorder(*program))
+    found = (_met(node) for node in deciding if node not in written)
     return tuple({choice: None for choice in found if choice.free.isdisjoint(variables)})
+
+
+@lru_cache(maxsize=4096)
+def _deciding(cut: Term) -> tuple[Branch | If, ...]:
+    """The conditions in a cut: one shader takes another's place, and cuts stay."""
+    return tuple(node for node in postorder(cut) if isinstance(node, Branch | If))
 
 
 def chosen(term: Term, sides: Mapping[Term, bool | None]) -> Term:

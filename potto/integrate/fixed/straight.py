@@ -113,8 +113,8 @@ def straight(term: Integral, body: Term, levels: Sequence[LevelPlan]) -> Straigh
         return None
     surfaces = tuple(dict.fromkeys(node.surface for node in nodes if isinstance(node, Branch)))
     cuts = [cut for level in levels for cut in children(level.frame.body)]
-    choices = choices_of(cuts, {*postorder(term), *nodes}, term.variables)
-    analytic = all(map(enclosable, surfaces)) and smooth(cuts, choices) and _enclosable_sides(body)
+    choices = choices_of(cuts, (term, body), term.variables)
+    analytic = all(map(enclosable, surfaces)) and smooth(cuts, choices) and _enclosable_sides(body, nodes)
     if not analytic or (steps is None and len(choices) > MOST_CHOICES):
         return None
     places, frames = zip(*(_distinct(level.frame) for level in levels), strict=True)
@@ -204,12 +204,15 @@ def _not_plain(level: LevelPlan) -> bool:
     return bool(level.found or level.corners or any(level.turned))
 
 
-def _enclosable_sides(body: Term) -> bool:
-    """Whether everything is enclosable that the integrand is on any of its sides."""
+def _enclosable_sides(body: Term, nodes: Iterable[Term]) -> bool:
+    """Whether everything is enclosable that the integrand is on any of its sides. nodes: all of its parts, also those
+    of surfaces, of which that is not asked."""
 
     def below(node: Term) -> Sequence[Term]:
         return (node.then, node.orelse) if isinstance(node, Branch) else children(node)
 
+    if all(isinstance(node, Branch) or known_to_discs(node) for node in nodes):
+        return True
     return all(isinstance(node, Branch) or known_to_discs(node) for node in postorder(body, below=below))
 
 

@@ -103,6 +103,7 @@ def enclosable(term: Term) -> bool:
     return all(map(known_to_discs, postorder(term)))
 
 
+@lru_cache(maxsize=4096)
 def known_to_discs(node: Term) -> bool:
     """Whether `enclosed` knows what a term does with its parts."""
     match node:

@@ -137,7 +137,7 @@ def step_integral(term: Integral, body: Term) -> StepIntegral | None:
         return None
     steps, heights = zip(*map(reading.heights, reading.names), strict=True)
     frame, levels = tuple(reading.rows), tuple_([height for own in heights for height in own])
-    choices = choices_of(frame, {*postorder(term), *postorder(body)}, term.variables)
+    choices = choices_of(frame, (term, body), term.variables)
     if not all(map(enclosable, (whole, *children(levels)))) or not smooth(frame, choices):
         return None
     dark = substitute(whole, dict.fromkeys(names, ZERO)) is ZERO
@@ -164,8 +164,8 @@ class _Reading:
         self.linear: set[Term] = set()
         self.chosen: set[Term] = set()
         self.names: dict[Term, str] = {}
-        for node in postorder(body, below=lambda node: () if self._still(node) else children(node)):
-            if not self._still(node) and self._is_linear(node):
+        for node in postorder(body, below=lambda node: children(node) if self.variable in node.free else ()):
+            if self.variable in node.free and self._is_linear(node):
                 self.linear.add(node)
 
     def _still(self, node: Term) -> bool:
