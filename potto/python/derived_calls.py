@@ -17,7 +17,7 @@ from potto.kernels.errors import wrong_call
 from potto.kernels.sweeps import Swept, swept
 from potto.kernels.tape import Node, Untaped
 from potto.projects.settings import current
-from potto.python.arguments import LEAST, Batch, value_of
+from potto.python.arguments import LEAST, Batch, value_of, with_axes
 from potto.python.calls import Call
 from potto.python.forms import by_name, in_lists, must_match, weighted
 from potto.python.moving import each_moving, own, size, with_own, with_places
@@ -171,7 +171,10 @@ class DerivedCall:
         """Keep what answers a call of this kind at once, if anything does."""
         values, machine = self.moved
         if all(isinstance(value, Cell) for value in values) and not (self.whole and self.batch.shape is not None):
-            self.call.keep([value.v for value in values], values, found, wrt, machine)  # type: ignore[union-attr]
+            args: list[Any] = [value.v for value in values]  # type: ignore[union-attr]
+            if self.batch.shape is not None and self.batch.size == 1:  # as they were given, and as what was found is
+                args = with_axes(args, len(self.batch.shape))
+            self.call.keep(args, values, found, wrt, machine)
 
     def answer(self, value: Value, tangents: Any, bounds: Any) -> Estimate:
         found = report(value, self.machine, self.clock)

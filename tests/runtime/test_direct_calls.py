@@ -224,6 +224,28 @@ def answered(monkeypatch: pytest.MonkeyPatch) -> list[bool]:
     return told
 
 
+@pytest.mark.parametrize("shape", [(1,), (1, 1)])
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_gradients_at_arrays_of_one_are_kept_where_no_number_came_before(
+    backend: str, shape: tuple[int, ...], answered: list[bool]
+) -> None:
+    module = potto.compile("""
+def f(t) (integral [0, 1] [x < t]*x d(x) - 0.3)^2 + t
+def g(a, b) integral [0, 1] exp(b*x)*[x < a] d(x)
+""")
+    t = np.full(shape, 0.7)
+    with potto.settings(backend=backend):
+        for call in (potto.grad(module.f), lambda t: potto.grad(module.g, ["b", "a"])(t, 0.5)):
+            answered.clear()
+            first, second = [call(t) for _ in range(4)][2:]
+            assert answered[-2:] == [True, True]
+            assert np.shape(second.value) == np.shape(first.member_converged) == shape
+    found = potto.grad(module.f)(t)
+    value, slope = (0.7**2 / 2 - 0.3) ** 2 + 0.7, 2 * (0.7**2 / 2 - 0.3) * 0.7 + 1
+    assert abs(found.value - value).item() <= found.error.item() and found.tangent.shape == shape
+    assert abs(found.tangent - slope).item() <= found.tangent_error.item()
+
+
 def test_arguments_by_name_are_those_by_place(answered: list[bool]) -> None:
     """They are answered at once as well; what is missing or unknown is told as ever."""
     f = potto.compile("def f(a, b) integral [0, 1] exp(b*x)*[x < a] d(x)").f
