@@ -7,6 +7,7 @@ what the domain could hold; that goes for any scale.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Literal
 
 import mpmath as mp
@@ -50,6 +51,73 @@ def test_a_slope_that_rounding_makes_0(many: int, backend: Literal["numpy", "nat
     truth = np.where(here, 0.5, 1.4)
     assert (np.abs(answer.value - truth) <= answer.error).all()
     assert (answer.error[~here] <= 1e-13).all()
+
+
+# Integrands of which rounding leaves nothing, and their integrals over [0, 1] and under an exponential density.
+NOTHING_LEFT: dict[str, Callable[[mp.mpf], mp.mpf]] = {
+    "(1 - cos(1e-8*x*t))*1e16": lambda x: (1 - mp.cos(mp.mpf(1e-8) * x)) * mp.mpf(1e16),
+    "(x*t + 1e16) - 1e16": lambda x: x,
+    "sqrt(x^2*t + 1e16) - 1e8": lambda x: mp.sqrt(x**2 + mp.mpf(1e16)) - 1e8,
+    "((x*t + 1e12)^2 - 1e24 - 2e12*x*t)*cos(30*x)": lambda x: (
+        ((x + mp.mpf(1e12)) ** 2 - mp.mpf(1e24) - 2 * mp.mpf(1e12) * x) * mp.cos(30 * x)
+    ),
+    "(exp(1e-17*x*t) - 1)*1e17": lambda x: mp.expm1(mp.mpf(1e-17) * x) * mp.mpf(1e17),
+}
+
+
+@pytest.mark.parametrize("body", NOTHING_LEFT)
+@pytest.mark.parametrize("over", ["x in [0, 1]", "x ~ exponential(1)", "x in [0, 1], y in [0, 2]"])
+def test_an_integrand_that_is_all_rounding(body: str, over: str) -> None:
+    ranges = {"x in [0, 1]": "[0, 1]", "x ~ exponential(1)": "(x ~ exponential(1))"}.get(over, "([0, 1], [0, 2])")
+    many = over.endswith("[0, 2]")
+    inside, names = (f"({body})*(1 + y)", "x, y") if many else (body, "x")
+    answer = potto.compile(f"def f(t) integral {ranges} {inside} d({names})").f(1.0)
+    with mp.workdps(60):
+        if "~" in over:
+            exact = mp.quad(lambda x: NOTHING_LEFT[body](x) * mp.exp(-x), [*range(0, 41), mp.inf])
+        else:
+            exact = mp.quad(NOTHING_LEFT[body], mp.linspace(0, 1, 11)) * (4 if many else 1)
+        assert abs(answer.value - exact) <= answer.error < math.inf
+    assert not answer.converged and answer.reasons
+
+
+@pytest.mark.parametrize("body", ["sin(x)^2 + cos(x)^2 - t", "exp(x)*exp(-x) - t"])
+@pytest.mark.parametrize("over", ["[0, 1]", "(x ~ normal(0, 1))"])
+def test_an_identity_leaves_its_rounding(body: str, over: str) -> None:
+    """The value is 0 and the slope -1, with all digits that there are: 20 units of what is subtracted."""
+    answer = potto.grad(potto.compile(f"def f(t) integral {over} {body} d(x)").f)(1.0)
+    assert abs(answer.value) <= answer.error <= 20 * 2.0**-52
+    assert abs(answer.tangent + 1) <= answer.tangent_error <= 1e-11
+
+
+@pytest.mark.parametrize("backend", ["numpy", "native"])
+@pytest.mark.parametrize("over", ["[0, 1]", "([0, 1], [0, 2])"])
+@pytest.mark.parametrize("body", NOTHING_LEFT)
+def test_many_integrands_that_are_all_rounding(body: str, over: str, backend: Literal["numpy", "native"]) -> None:
+    names, area = ("x, y", 2) if "," in over[4:] else ("x", 1)
+    f = potto.compile(f"def f(t) integral {over} {body} d({names})").f
+    with potto.settings(backend=backend), mp.workdps(60):
+        answer = f(np.ones(300))
+        exact = float(area * mp.quad(NOTHING_LEFT[body], mp.linspace(0, 1, 11)))
+    assert (np.abs(answer.value - exact) <= answer.error).all() and np.isfinite(answer.error).all()
+
+
+@pytest.mark.parametrize("backend", ["numpy", "native"])
+@pytest.mark.parametrize("many", [1, 3, 300])
+def test_rounding_within_where_the_ends_have_none(many: int, backend: Literal["numpy", "native"]) -> None:
+    """x + 1e7 is exact at 0 and at 1, and so is 1e7 exp(0) - 1e7; between them seven digits are lost."""
+    f = potto.compile("def f(t) integral [0, 1] exp(-(x - 1e8*t + 1e8)^2) d(x)").f
+    g = potto.compile("def g(t) integral [0, 1] exp(x*t*1e-7)*1e7 - 1e7 d(x)").g
+    with mp.workdps(40):
+        small = mp.mpf(1e-7)
+        exact_f, exact_g = mp.sqrt(mp.pi) / 2 * mp.erf(1), mp.mpf(1e7) * (mp.expm1(small) / small - 1)
+        slope_f, slope_g = mp.mpf(1e8) * (1 - mp.exp(-1)), mp.mpf(1e7) * (mp.exp(small) - mp.expm1(small) / small)
+    for function, exact, slope in ((f, exact_f, slope_f), (g, exact_g, slope_g)):
+        with potto.settings(backend=backend):
+            answer = potto.grad(function)(np.ones(many))
+        assert (np.abs(answer.value - float(exact)) <= answer.error).all() and answer.error.max() < 1e-6
+        assert (np.abs(answer.tangent - float(slope)) <= answer.tangent_error).all()
+        assert (answer.tangent_error <= 1e-7 * abs(slope)).all()
 
 
 def test_a_slope_that_is_0_is_no_doubt() -> None:

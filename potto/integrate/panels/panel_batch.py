@@ -17,7 +17,17 @@ from potto.integrate.events import BUDGET_SPENT, TwoSided, Unsearched
 from potto.integrate.levels import LevelPlan
 from potto.integrate.panels.iterated import Iterated
 from potto.integrate.panels.mending import mend
-from potto.integrate.panels.roundoff import few_doubles, misplaced, noise, note_ends, shake, share, together
+from potto.integrate.panels.roundoff import (
+    WITHIN,
+    few_doubles,
+    misplaced,
+    noise,
+    note_ends,
+    part_of,
+    shake,
+    share,
+    together,
+)
 from potto.integrate.pieces import Crossing, Ends, Evaluator, Pieces, Sums, all_of, column, dense, gather, still, take
 from potto.integrate.rules import substitution
 from potto.integrate.rules.gauss import EPS, GaussRule, gauss, truncation
@@ -27,9 +37,11 @@ from potto.kernels.cells import Array, Bools, Cell, Ints, Mask, Number, Value, p
 CHUNK = 1 << 15  # points per kernel call: a few buffers of this length fit the second-level cache
 MOST_SLACK = 1e6  # how many times the error of a node may be larger that hardly counts
 UNSURE = 1e-9  # how far off cuts may be, in parts of a segment, until it matters that integrands bend beside them
-# From which part of it on rounding at both ends may be what is left where an integrand vanishes: then places within
-# tell, at which not all is 0, or stands still, by symmetry.
-HIDDEN, WITHIN = 2.0**-40, (0.309, 0.618)
+# From which part of it on rounding at both ends may be what is left where an integrand vanishes: places within tell.
+HIDDEN = 2.0**-40
+# Up to which part of an integrand its rounding within is no more than what is counted for its variable; and how many
+# segments are looked at within, if there are more.
+CLEAR, LOOKED_AT = 16 * EPS, 64
 BESIDE = 1e-9  # how far from the ends of a segment, in parts of it, it is looked at just inside
 
 
@@ -66,6 +78,7 @@ class PanelBatch(Struct, dict=True):
         # What is added up further in, on the average, where it comes to nothing.
         self.hidden: Array = np.zeros((2, self.batch))
         self.last = self.number + 1 == len(self.parent.plan.levels)
+        self.tracked = self.parent.tracked  # whether the integrand brings its rounding along at every node
         # Without forced sides there are no values on a surface: only the moving form does without them.
         self.both = self.moving and not self.parent.plan.hides
         self.inner = self.machine.with_directions(self.k + 1) if self.moving else self.machine
@@ -160,7 +173,7 @@ class PanelBatch(Struct, dict=True):
         ends = np.moveaxis(coefficients @ rule.ends, -1, 0) if self.blind else np.empty((0, p.u0.size))
         p.led = ends.reshape(-1, p.u0.size)
         p.floor = 4 * EPS * p.size + (size @ rule.slopes) * shake
-        if self.ends is not None and self.last and not self.parent.tracked:
+        if self.ends is not None and self.last and not self.tracked:
             p.floor += noise(self.ends, self.width, p, seg)
         if self.both or self.bends or self.rested:
             if self.at_ends is None:
@@ -286,27 +299,50 @@ class PanelBatch(Struct, dict=True):
         with nullcontext() if costs is None else costs.ends(seg.ta, seg.tb, self.parent.machine.directions):
             f, e = self.still_at(np.concatenate(self.just_inside()), owner, sides)
         part = np.minimum(share(f[:, :count], e[:, :count]), share(f[:, count:], e[:, count:]))
-        if self.last and not self.parent.tracked and (hidden := np.nonzero((part > HIDDEN).any(axis=0))[0]).size:
-            part[:, hidden] = self.share_within(hidden)
+        if self.last and not self.tracked:
+            part = self.seen_within(part)
+            if (part >= 1).any():  # a part of nothing says nothing
+                self.inner, self.tracked = self.inner.tracking(), True
         return Ends(f[:, :count], f[:, count:], e[:, :count], e[:, count:], part)
 
+    def seen_within(self, at_ends: Array) -> Array:
+        """Which part of F its rounding is on segments, (m, S): that at their ends, which are often whole numbers, where
+        sums are exact, unless it is more within. Of many segments some are looked at, and all if these say so."""
+        hidden, count = (at_ends > HIDDEN).any(axis=0), at_ends.shape[1]
+        index = np.union1d(np.linspace(0, count - 1, min(count, LOOKED_AT)).astype(np.int64), np.flatnonzero(hidden))
+        clear = np.maximum(at_ends, CLEAR)
+        within = self.share_within(index)
+        if index.size < count and (within > clear[:, index])[:, ~hidden[index]].any():
+            index = np.arange(count)
+            within = self.share_within(index)
+        part = at_ends.copy()
+        part[:, index] = np.where(hidden[index] | (within > clear[:, index]), within, at_ends[:, index])
+        return part
+
     def share_within(self, index: Ints) -> Array:
-        """Which part of F its rounding is within segments, at places together: (m, I)."""
-        here = self.seg.pick(index)
-        x, _, _ = substitution.points(here, np.tile(WITHIN, (index.size, 1)))
-        rows = np.repeat(index, len(WITHIN))
+        """Which part of F its rounding is within segments, 0 where there is none, at places together, which are not
+        counted as evaluations: (m, I)."""
+        x, _, _ = substitution.points(self.seg.pick(index), np.tile(WITHIN, (index.size, 1)))
+        rows = np.repeat(index, WITHIN.size)
         sides = {g: take(m, rows) for g, m in self.sides.items()}
-        f, e = self.still_at(x.ravel(), self.seg.owner[rows], sides)
-        return share(*(np.abs(row).reshape(-1, *x.shape).sum(axis=-1) for row in (f, e)))
+        here = self.standing(x.ravel(), self.seg.owner[rows])
+        numbers, errors = dense(
+            self.parent.body(here, sides, self.machine.with_directions(0).tracking()), 0, rows.shape
+        )
+        off = np.zeros(numbers.shape) if errors is None else np.where(np.isfinite(errors), errors, 0.0)
+        return part_of(*(np.abs(row[:, 0]).reshape(-1, *x.shape).sum(axis=-1) for row in (numbers, off)))
 
     def still_at(self, x: Array, owner: Ints, sides: dict[int, Mask]) -> tuple[Array, Array]:
         """F at places of members, without tangents, and its rounding, where F is finite: (m, N) each."""
-        names = self.parent.plan.body.params if self.last else self.env
-        here = gather({n: still(v) for n, v in self.env.items() if n in names}, owner)
-        here[self.level.variable] = Cell(x)
-        frozen = self.machine.with_directions(0)
+        here, frozen = self.standing(x, owner), self.machine.with_directions(0)
         f, e = self.parent.inside(self.number, here, x.size, sides, frozen, self.below(owner))
         return f, np.where(np.isfinite(e), e, 0.0)
+
+    def standing(self, x: Array, owner: Ints) -> dict[str, Value]:
+        """The environments of places of members, in which nothing moves."""
+        names = self.parent.plan.body.params if self.last else self.env
+        here = gather({n: still(v) for n, v in self.env.items() if n in names}, owner)
+        return {**here, self.level.variable: Cell(x)}
 
     def just_inside(self) -> tuple[Array, Array]:
         """The ends of segments; points next to them where on the ends themselves it is not known what is further in."""

@@ -1,7 +1,7 @@
 """What rounding does to the integral over a piece.
 
-Owns `shake` and `few_doubles` (of nodes), `share` and `noise` (of the integrand), `misplaced`, `note_ends` and
-`hidden_steps` (of the ends of segments) and `together` (of derivatives that move with the nodes).
+Owns `shake` and `few_doubles` (of nodes), `share`, `part_of` and `noise` (of the integrand), `misplaced`, `note_ends`
+and `hidden_steps` (of the ends of segments) and `together` (of derivatives that move with the nodes).
 """
 
 from __future__ import annotations
@@ -21,6 +21,9 @@ FAR = 8
 # Up to which part of its size two interpolants of one integrand differ at their common end by their rounding; from
 # which on that is a jump, which is looked for where cuts move in different ways (`degenerate.degeneracies`).
 SMOOTH, STEP = 1e-13, 1e-6
+# Places within a range, as parts of it, that tell the rounding of an integrand: there not all is 0, or stands still, by
+# symmetry.
+WITHIN = np.array((0.309, 0.618))
 
 
 def few_doubles(seg: Segments, weight: Array) -> bool:
@@ -48,6 +51,11 @@ def share(f: Array, e: Array) -> Array:
     """Which part of numbers their errors are; infinite where nothing is left of them."""
     part: Array = np.divide(e, np.abs(f), out=np.full(f.shape, np.inf), where=(f != 0) & np.isfinite(f))
     return part
+
+
+def part_of(size: Array, off: Array) -> Array:
+    """The same of numbers added up at places, and 0 where their errors are."""
+    return np.where(off > 0, share(size, off), 0.0)
 
 
 def noise(ends: Ends, width: int, p: Pieces, seg: Segments) -> Array:

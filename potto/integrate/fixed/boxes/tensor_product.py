@@ -19,7 +19,8 @@ from potto.core.terms import Lam, Term
 from potto.integrate.columns import run_of
 from potto.integrate.fixed.lowered.box_text import NODE_ROUNDING
 from potto.integrate.fixed.straight import StraightIntegral
-from potto.integrate.pieces import Evaluator, Sums, components, gather, still
+from potto.integrate.panels.roundoff import WITHIN, part_of
+from potto.integrate.pieces import Evaluator, Sums, components, dense, gather, still
 from potto.integrate.rules.gauss import EPS, PEAK, gauss, truncation
 from potto.kernels.cells import Array, Bools, Cell, Ints, Value
 
@@ -123,7 +124,8 @@ def _at_nodes(
     volume = size.prod(axis=0)
     found = _means(face, machine, env, low, size, orders)
     number, most = found.number, found.most
-    error, floor = np.zeros(number.shape), 4 * EPS * most + found.own
+    part = _share(face, machine, env, low, size)
+    error, floor = np.zeros(number.shape), (4 * EPS + np.where(part > 4 * EPS, part, 0.0)[:, None]) * most + found.own
     for variable, (n, mean) in enumerate(zip(face.exact, found.along, strict=True)):
         slopes = gauss(mean.shape[2]).slopes
         if n is None:
@@ -134,13 +136,23 @@ def _at_nodes(
         if bounds.off is not None:  # at a bound the integrand is at most what its coefficients add up to
             floor += mean.sum(axis=2) * (bounds.off[variable] / size[variable])
     asked = np.maximum(0.5 * machine.rtol * np.abs(number), 0.5 * machine.atol / volume)
-    good: Bools = (error <= np.maximum(asked, 8 * floor)).all(axis=(0, 1))
+    good: Bools = (error <= np.maximum(asked, 8 * floor)).all(axis=(0, 1)) & (part < 1).all(axis=0)
     if None in face.exact:
         good &= (_at_corners(face, machine, env, low, size) <= PEAK * found.largest).all(axis=0)
     error += floor
     total, bound, most = number * volume, error * volume, most.max(axis=0) * volume
     gross = np.stack((most[0], most[1:].max(axis=0, initial=0.0)))
     return Sums(total[:, 0], bound[:, 0], total[:, 1:], bound[:, 1:], gross=gross), good
+
+
+def _share(face: BoxIntegrand, machine: Evaluator, env: dict[str, Value], low: Array, size: Array) -> Array:
+    """Which part of the integrand its own rounding is, by places within: (m, B)."""
+    there = {name: still(value) for name, value in env.items()}
+    tracking = machine.with_directions(0).tracking()
+    cells = _values(face, tracking, there, low, size, [WITHIN[:, None]] * len(low))
+    numbers, errors = dense(tuple(cells), 0, (WITHIN.size, low.shape[1]))
+    sums = (np.abs(row[:, 0]).sum(axis=1) for row in (numbers, np.zeros(numbers.shape) if errors is None else errors))
+    return part_of(*sums)
 
 
 def _means(

@@ -18,6 +18,7 @@ from potto.integrate.fixed.axes import ENDS
 from potto.integrate.fixed.lowered.formula_text import ParameterPlace, Symbol, still
 from potto.integrate.fixed.lowered.rule_text import RuleText
 from potto.integrate.fixed.straight import StraightIntegral
+from potto.integrate.panels.roundoff import WITHIN
 from potto.integrate.pieces import Evaluator
 from potto.integrate.rules.gauss import EPS, PEAK, gauss
 from potto.integrate.rules.written_intervals import Names, WrittenInterval
@@ -95,9 +96,10 @@ class BoxText(RuleText):
             for room in (*self.most, *self.own, *self.largest, *self.peaks):
                 at.store(self.zero, room)
             means = [x or self.zero for x in self.mean(0, here, self.one)]
+            standing = {name: still(symbol) for name, symbol in here.items()}
             if not all(self.exact):
-                self.at_corners(0, {name: still(symbol) for name, symbol in here.items()})
-            self.results(means, mask)
+                self.at_corners(0, standing)
+            self.results(means, self.shares(standing), mask)
             at.end()
         return self.end()
 
@@ -239,10 +241,27 @@ class BoxText(RuleText):
         """Where variable i is, at a place of [0, 1]."""
         return self.at.apply("add", self.low[i], self.at.apply("mul", self.sizes[i], u))
 
+    def shares(self, env: Mapping[str, Symbol]) -> list[str | None]:
+        """Which part of each number its own rounding is, by places within, None for 0: see `roundoff.part_of`."""
+        at, machine = self.at, self.machine.with_directions(0).tracking()
+        met = []
+        for part in map(at.number, WITHIN.tolist()):
+            inside = {x: Symbol(self.between(i, part), None, (), ()) for i, x in enumerate(self.plan.variables)}
+            met.append(self.evaluated(self.face, {**env, **inside}, machine))
+        return [self.share(cells) for cells in zip(*met, strict=True)]
+
+    def share(self, cells: Sequence[Symbol]) -> str | None:
+        """The same of one number at these places."""
+        at, off = self.at, self.total(*(cell.e for cell in cells))
+        size = self.total(*(at.apply("abs", cell.v) for cell in cells))
+        if off is None or size is None:
+            return None
+        return at.apply("select", at.apply("gt", off, self.zero), at.apply("div", off, size), self.zero)
+
     # What they amount to
 
-    def results(self, means: Sequence[str], mask: str) -> None:
-        """Put the integrals of the members of a mask for whom the rule does."""
+    def results(self, means: Sequence[str], shares: Sequence[str | None], mask: str) -> None:
+        """Put the integrals of the members of a mask for whom the rule does. shares: what their own rounding is."""
         at, k1 = self.at, self.k1
         volume = self.sizes[0]
         for size in self.sizes[1:]:
@@ -255,8 +274,7 @@ class BoxText(RuleText):
         rtol, least = at.constant("%constants", 0), at.apply("div", at.constant("%constants", 1), volume)
         bounds, good = [], None
         for c, mean in enumerate(means):
-            error, floor = self.zero, at.apply("mul", at.number(4 * EPS), at.load(self.most[c]))
-            floor = at.apply("add", floor, at.load(self.own[c]))
+            error, floor = self.zero, self.own_rounding(c, shares[c // k1])
             for i, n in enumerate(self.orders):
                 sizes = [at.load(at.at(self.added[i], row * self.channels + c)) for row in range(n)]
                 slope = self.total(*(at.apply("mul", at.number(float(s)), x)
@@ -273,6 +291,7 @@ class BoxText(RuleText):
         for peak, room in zip(self.peaks, self.largest, strict=True):
             seen = at.apply("mul", at.number(PEAK), at.load(room))
             good = at.apply("and", good, at.apply("le", at.load(peak), seen))
+        good = self.all([good, *(at.apply("lt", part, self.one) for part in shares if part is not None)])
         most = [at.load(room) for room in self.most]
         gross = [most[::k1], [x for c, x in enumerate(most) if c % k1] or [self.zero]]
         rows = [*means, *bounds]
@@ -286,6 +305,14 @@ class BoxText(RuleText):
             self.keep(done, at.apply("mul", value, volume), self.place(number))
         state = at.apply("select", good, at.number(float(DONE)), at.number(float(LEFT)))
         self.keep(mask, state, self.state)
+
+    def own_rounding(self, c: int, share: str | None) -> str:
+        """What the rounding of the integrand, and of parameters, comes to in a channel."""
+        at, factor = self.at, self.at.number(4 * EPS)
+        if share is not None:
+            more = at.apply("select", at.apply("gt", share, factor), share, self.zero)
+            factor = at.apply("add", factor, more)
+        return at.apply("add", at.apply("mul", factor, at.load(self.most[c])), at.load(self.own[c]))
 
     def keep(self, mask: str, value: str, place: str) -> None:
         """Put a number for the members of a mask."""
