@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
+import mpmath as mp
 import numpy as np
 import pytest
 
@@ -53,3 +54,13 @@ def f(t)
     answer = potto.deriv(f)((0.3, 1.0))
     exact = math.expm1(0.3) + 0.3 * math.exp(0.3)  # of t (e^t - 1)
     assert abs(answer.tangent - exact) <= answer.tangent_error + 1e-15 <= 1e-10
+
+
+@pytest.mark.parametrize("waves", [1e10, 1e12])
+def test_waves_too_short_for_differences(waves: float) -> None:
+    """At parameters a 64th and a 128th apart they look like slow ones; the derivative itself has six digits at 1e10."""
+    f = potto.compile(f"def f(t) integral [0, 1] sin(x + {waves!r}*t) d(x)").f
+    answer = potto.grad(f)(1.0)
+    with mp.workdps(40):
+        exact = waves * (mp.sin(mp.mpf(waves) + 1) - mp.sin(mp.mpf(waves)))
+        assert abs(answer.tangent - exact) <= answer.tangent_error <= 0.01 * abs(exact)
