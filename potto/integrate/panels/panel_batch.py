@@ -308,7 +308,8 @@ class PanelBatch(Struct, dict=True):
     def seen_within(self, at_ends: Array) -> Array:
         """Which part of F its rounding is on segments, (m, S): that at their ends, which are often whole numbers, where
         sums are exact, unless it is more within. Of many segments some are looked at, and all if these say so."""
-        hidden, count = (at_ends > HIDDEN).any(axis=0), at_ends.shape[1]
+        hidden: Bools = np.any(at_ends > HIDDEN, axis=0)
+        count = at_ends.shape[1]
         index = np.union1d(np.linspace(0, count - 1, min(count, LOOKED_AT)).astype(np.int64), np.flatnonzero(hidden))
         clear = np.maximum(at_ends, CLEAR)
         within = self.share_within(index)
