@@ -5,7 +5,8 @@ Owns `Sums`, `Shaped`, `Pieces` and `Evaluator`, the integrator's view of the ma
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager
 from typing import Any, Protocol
 
 import numpy as np
@@ -14,12 +15,14 @@ from msgspec import Struct, field
 from potto.core.terms import Lam
 from potto.integrate.columns import Columns, joined
 from potto.integrate.costs import Costs
+from potto.integrate.decomposition.root_isolation import Isolated
 from potto.integrate.events import Event, Events, Members
 from potto.integrate.rules import substitution
 from potto.integrate.rules.gauss import gauss, leaning
 from potto.kernels.cells import Array, Bools, Cell, Ints, Mask, Number, Pattern, Trace, Value, map_arrays, map_cells
 from potto.kernels.errors import not_a_number
 from potto.kernels.written import Kernel
+from potto.projects.settings import Settings
 
 STRAY = 8
 TELLING = 4  # nodes, from which on values tell where a singularity is; a polynomial may need fewer
@@ -32,6 +35,8 @@ class Evaluator(Protocol):
     for what is to be known by itself of what it meets.
     """
 
+    @property
+    def settings(self) -> Settings: ...
     @property
     def rtol(self) -> float: ...
     @property
@@ -47,11 +52,20 @@ class Evaluator(Protocol):
     def taped(self) -> Evaluator: ...
     def standing(self) -> Evaluator: ...
     def looking_aside(self) -> Evaluator: ...
-    def evaluate(self, lam: Lam, env: dict[str, Value], trace: Trace | None) -> Value: ...
+    def asked(self, settings: Settings) -> Evaluator: ...
+    def among(self, index: Ints) -> AbstractContextManager[Evaluator]: ...
+    def evaluate(self, function: Lam, env: Mapping[str, Value], trace: Trace | None) -> Value: ...
     def kernel(self, lam: Lam, patterns: tuple[Pattern, ...]) -> Kernel: ...
     @property
     def backend(self) -> str: ...
     def count(self, evaluations: int) -> None: ...
+    def sampled(self, share: float, limit: bool) -> None: ...
+    def search(self, boxes: int) -> bool: ...
+    def isolates(self, cells: int) -> bool: ...
+    @property
+    def isolated(self) -> Isolated: ...
+    @property
+    def spent(self) -> float: ...
     def exhausted(self) -> bool: ...
     def overdrawn(self) -> bool: ...
     @property
@@ -325,6 +339,20 @@ def components(value: Value) -> list[Cell]:
     if isinstance(value, tuple):
         return [c for item in value for c in components(item)]
     raise not_a_number(value)
+
+
+def number_at(function: Lam, machine: Evaluator, env: Mapping[str, Value]) -> Cell:
+    """The number that a function gives, whose parameters have the values of `env`."""
+    value = machine.evaluate(function, env, None)
+    assert isinstance(value, Cell)
+    return value
+
+
+def numbers_at(function: Lam, machine: Evaluator, env: Mapping[str, Value]) -> tuple[Cell, ...]:
+    """The same of a function to a tuple of numbers."""
+    values = machine.evaluate(function, env, None)
+    assert isinstance(values, tuple)
+    return values  # type: ignore[return-value]
 
 
 def still(value: Value) -> Value:

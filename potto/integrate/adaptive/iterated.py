@@ -211,9 +211,7 @@ class Iteration(Struct):
 
     def rows(self, level: LevelPlan, env: dict[str, Value], batch: int, machine: Evaluator) -> Rows:
         """The bounds of a variable, all candidate cuts, and the most that those matter which were not looked for."""
-        values = machine.tracking().evaluate(level.frame, env, None)
-        assert isinstance(values, tuple)
-        lo, hi, rows = frame_rows(level, values)
+        lo, hi, rows = frame_rows(level, machine.tracking(), env)
         face = None if self.face is None else self.face.surface
         if level.walls:
             rows = within_walls(level, rows, env, batch, machine, face)
@@ -320,7 +318,7 @@ class Iteration(Struct):
         if self.face is not None:
             return self.face.crossed(self.plan, env, sides, machine)
         body = self.plan.body
-        return machine.evaluate(body, {n: env[n] for n in body.params}, self.plan.trace(sides))
+        return machine.evaluate(body, env, self.plan.trace(sides))
 
     def inside(
         self, number: int, env: dict[str, Value], batch: int, sides: dict[int, Mask], machine: Evaluator,

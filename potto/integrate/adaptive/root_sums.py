@@ -14,7 +14,7 @@ from potto.core.terms import function_of, tuple_
 from potto.integrate.columns import distinct
 from potto.integrate.decomposition.meetings import SEARCHED, Row, as_array, tangents
 from potto.integrate.events import at_a_fold, root_on_a_bound
-from potto.integrate.pieces import Evaluator, Sums, components, gather, take
+from potto.integrate.pieces import Evaluator, Sums, components, gather, numbers_at, take
 from potto.integrate.plan import Plan
 from potto.integrate.rules.gauss import EPS
 from potto.kernels.cells import Array, Bools, Cell, Ints, Mask, Value, map_cells
@@ -41,9 +41,8 @@ def over_roots(
     counts, folded = _roots(over, here, machine)
     inside = (root_x > low[owner]) & (root_x < high[owner]) & counts
     unsure = counts & ((np.abs(root_x - low[owner]) <= off) | (np.abs(root_x - high[owner]) <= off))
-    value = machine.tracking().evaluate(
-        plan.body, {n: here[n] for n in plan.body.params}, plan.trace({g: take(m, owner) for g, m in sides.items()})
-    )
+    trace = plan.trace({g: take(m, owner) for g, m in sides.items()})
+    value = machine.tracking().evaluate(plan.body, here, trace)
     sums = _added(components(value), owner, inside, unsure, batch, k)
     sums.v *= np.where(as_array(hi.v, batch) < as_array(lo.v, batch), -1.0, 1.0)
     sums.t *= np.where(as_array(hi.v, batch) < as_array(lo.v, batch), -1.0, 1.0)
@@ -86,9 +85,8 @@ def _roots(over: LevelSet, here: dict[str, Value], machine: Evaluator) -> tuple[
     """Which places are roots, and not poles or jumps; and where the level set folds, as far as rounding tells."""
     face = function_of(tuple_((over.surface, partial(over.surface, over.shares[0]))))
     still = machine.with_directions(0).tracking()
-    found = still.evaluate(face, {n: _without_tangents(here[n]) for n in face.params}, None)
-    assert isinstance(found, tuple)
-    (value, off), (slope, rounding) = ((cell.v, 0.0 if cell.e is None else cell.e) for cell in components(found))
+    found = numbers_at(face, still, {n: _without_tangents(here[n]) for n in face.params})
+    (value, off), (slope, rounding) = ((cell.v, 0.0 if cell.e is None else cell.e) for cell in found)
     size = np.asarray(here[over.shares[0]].v).shape  # type: ignore[union-attr]
     zero = np.isfinite(value) & ~(np.abs(value) > CLEAR * off)
     return np.broadcast_to(zero, size), np.broadcast_to(np.abs(slope) <= rounding, size)

@@ -8,7 +8,6 @@ bound is not 0 on the sides of the others where it lies.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
@@ -20,7 +19,7 @@ from potto.integrate.decomposition.balls import Ball
 from potto.integrate.decomposition.conic_crossings import crossings
 from potto.integrate.decomposition.meetings import as_array, tangents
 from potto.integrate.levels import Corners
-from potto.integrate.pieces import gather
+from potto.integrate.pieces import Evaluator, gather, number_at, numbers_at
 from potto.integrate.rules.gauss import EPS
 from potto.kernels.cells import Array, Bools, Cell, Ints, Value, pad
 
@@ -64,7 +63,7 @@ def conic_corners(lines: Sequence[Array], conics: Sequence[Array], span: tuple[A
 
 
 def mixed_corners(
-    lines: Sequence[Array], conics: Sequence[Array], span: tuple[Array, Array], polynomial: Lam, machine: Any
+    lines: Sequence[Array], conics: Sequence[Array], span: tuple[Array, Array], polynomial: Lam, machine: Evaluator
 ) -> Places:
     """The same where an integrand is a polynomial in the sides of all, also of which two lines cross."""
     with np.errstate(all="ignore"):
@@ -87,7 +86,7 @@ def _pairs(v: Array) -> tuple[Ints, Ints, Ints]:
     return p, q, np.tile(np.arange(batch), p.size // batch)
 
 
-def _bounds_both(v: Array, e: Array, places: Places, polynomial: Lam, machine: Any) -> Bools:
+def _bounds_both(v: Array, e: Array, places: Places, polynomial: Lam, machine: Evaluator) -> Bools:
     """Whether there may be something at places that both surfaces p and q bound."""
     p, q, owner, place, off = places.p, places.q, places.owner, places.place, places.off
     over, under = ([_holds(sign * v[:, n, owner], e[:, n, owner], place, off) for n in range(v.shape[1])]
@@ -100,8 +99,8 @@ def _bounds_both(v: Array, e: Array, places: Places, polynomial: Lam, machine: A
     corners = []
     for first, second in ((1.0, 1.0), (1.0, 0.0), (0.0, 1.0), (0.0, 0.0)):
         sides[p, at], sides[q, at] = first, second
-        env = {name: Cell(sides[n]) for n in range(v.shape[1]) if (name := side(n)) in polynomial.params}
-        corners.append(as_array(machine.with_directions(0).evaluate(polynomial, env, None).v, p.size))
+        env = {side(n): Cell(own) for n, own in enumerate(sides)}
+        corners.append(as_array(number_at(polynomial, machine.with_directions(0), env).v, p.size))
     one, other, third, none = corners
     mixed = np.abs(one - other - third + none)
     still = mixed <= CANCELLED * np.abs(np.stack(corners)).max(axis=0)
@@ -161,7 +160,7 @@ def _parts(cell: Cell, count: int, directions: int) -> tuple[Array, Array, Array
 
 
 def moving(
-    region: Corners, variable: str, env: dict[str, Value], places: Places, machine: Any
+    region: Corners, variable: str, env: dict[str, Value], places: Places, machine: Evaluator
 ) -> tuple[Ints, Array, Array, Array, Array]:
     """Whose the crossings are, where along the variable by Newton's method, how far off, their speeds (k, P) by
     the implicit function theorem, and how far off these are."""
@@ -174,9 +173,7 @@ def moving(
         """Both surfaces at places, with tangents and gradients (k + 2, P), and how far off all of that is."""
         for n, name in enumerate((variable, region.within.variable)):
             here[name] = Cell(place[n], None, (*(None,) * k, *(1.0 if n == m else None for m in range(2))))
-        cells = tracked.evaluate(function, {name: here[name] for name in function.params}, None)
-        assert isinstance(cells, tuple)
-        rows = [_parts(cell, which.size, k + 2) for cell in cells if isinstance(cell, Cell)]
+        rows = [_parts(cell, which.size, k + 2) for cell in numbers_at(function, tracked, here)]
         parts = [np.stack(of, axis=-2) for of in zip(*rows, strict=True)]
         return [[part[..., line, which] for part in parts] for line in (places.p, places.q)]
 

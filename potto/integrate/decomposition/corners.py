@@ -23,7 +23,7 @@ from potto.integrate.decomposition.critical_places import common_places
 from potto.integrate.decomposition.meetings import Row, as_array, tangents
 from potto.integrate.events import Unsearched
 from potto.integrate.levels import Corners, LevelPlan
-from potto.integrate.pieces import gather
+from potto.integrate.pieces import Evaluator, gather, numbers_at
 from potto.integrate.rules.gauss import EPS
 from potto.kernels.cells import Array, Cell, Ints, Value
 
@@ -99,13 +99,14 @@ def _doubt(a: Sequence[Array], b: Sequence[Array]) -> Array:
     return a[1] * np.abs(b[0]) + b[1] * np.abs(a[0])
 
 
-def corner_rows(level: LevelPlan, env: dict[str, Value], lo: Cell, hi: Cell, batch: int, machine: Any) -> list[Row]:
+def corner_rows(
+    level: LevelPlan, env: dict[str, Value], lo: Cell, hi: Cell, batch: int, machine: Evaluator
+) -> list[Row]:
     """The cuts of one variable at the corners of regions."""
     rows: list[Row] = []
     span = as_array(np.minimum(lo.v, hi.v), batch), as_array(np.maximum(lo.v, hi.v), batch)
     for region in level.corners:
-        values = machine.tracking().evaluate(region.numbers, {n: env[n] for n in region.numbers.params}, None)
-        numbers = _numbers(values, batch, machine.directions)
+        numbers = _numbers(numbers_at(region.numbers, machine.tracking(), env), batch, machine.directions)
         unknown = ~np.isfinite(numbers[0][: 3 * region.lines - 6]).all(axis=0)
         if unknown.any():
             machine.note(Unsearched(level.variable), np.nonzero(unknown)[0])
@@ -129,7 +130,7 @@ def corner_rows(level: LevelPlan, env: dict[str, Value], lo: Cell, hi: Cell, bat
 
 
 def _touching(
-    region: Corners, places: Places, variable: str, env: dict[str, Value], batch: int, machine: Any
+    region: Corners, places: Places, variable: str, env: dict[str, Value], batch: int, machine: Evaluator
 ) -> list[Row]:
     """Cuts where conics touch: what their numbers do not tell, a search does for places, about there, at which both
     surfaces are 0 as they were written."""
@@ -153,7 +154,7 @@ def _touching(
 
 
 def _crossing(
-    lines: _Lines, conics: Sequence[Array], span: tuple[Array, Array], polynomial: Lam | None, machine: Any
+    lines: _Lines, conics: Sequence[Array], span: tuple[Array, Array], polynomial: Lam | None, machine: Evaluator
 ) -> tuple[tuple[Ints, Ints, Ints], Places]:
     """Which two lines cross where there may be a corner, and of which member; and where conics take part."""
     if polynomial is None:
@@ -165,10 +166,8 @@ def _crossing(
     return (straight.p - first, straight.q - first, straight.owner), places.pick(~flat)
 
 
-def _numbers(values: Value, batch: int, directions: int) -> tuple[Array, Array, Array, Array]:
+def _numbers(cells: Sequence[Cell], batch: int, directions: int) -> tuple[Array, Array, Array, Array]:
     """Numbers of a batch (n, B), how far off they are, their tangents (k, n, B), and how far off these are."""
-    assert isinstance(values, tuple)
-    cells = [cell for cell in values if isinstance(cell, Cell)]
     v = np.stack([as_array(cell.v, batch) for cell in cells])
     e = np.stack([as_array(0.0 if cell.e is None else np.abs(cell.e), batch) for cell in cells])
     t = np.stack([tangents(cell.t, batch, directions) for cell in cells], axis=1)
@@ -225,13 +224,13 @@ def _clipped(lines: _Lines, size: Array, some: Ints) -> tuple[Ints, Ints, Ints]:
 
 
 def within_walls(
-    level: LevelPlan, rows: list[Row], env: dict[str, Value], batch: int, machine: Any, face: Term | None
+    level: LevelPlan, rows: list[Row], env: dict[str, Value], batch: int, machine: Evaluator, face: Term | None
 ) -> list[Row]:
     """The cuts of a range outside of whose walls nothing is integrated, without those outside.
 
     face: the surface, if any, that is not a wall, since it is what is integrated over.
     """
-    slopes = machine.with_directions(0).evaluate(level.slopes, {n: env[n] for n in level.slopes.params}, None)
+    slopes = numbers_at(level.slopes, machine.with_directions(0), env)
     least: Any = -np.inf
     most: Any = np.inf
     for wall, slope in zip(level.walls, slopes, strict=True):

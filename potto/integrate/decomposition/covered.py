@@ -14,17 +14,18 @@ from potto.core.terms import Term
 from potto.integrate.decomposition.corners import beside
 from potto.integrate.decomposition.meetings import Row, as_array
 from potto.integrate.levels import LevelPlan
+from potto.integrate.pieces import Evaluator, numbers_at
 from potto.kernels.cells import Array, Value
 
 
 def uncovered(
-    level: LevelPlan, rows: list[Row], env: dict[str, Value], batch: int, machine: Any, face: Term | None
+    level: LevelPlan, rows: list[Row], env: dict[str, Value], batch: int, machine: Evaluator, face: Term | None
 ) -> list[Row]:
     """The cuts of a range without those that are covered.
 
     face: the surface, if any, that covers nothing, since it is what is integrated over.
     """
-    slopes = machine.with_directions(0).evaluate(level.covering, {n: env[n] for n in level.covering.params}, None)
+    slopes = numbers_at(level.covering, machine.with_directions(0), env)
     lows, highs = [], []
     for ends, slope in zip(level.covers, slopes, strict=True):
         if level.level.cuts[rows[ends[0]].cut].surface is face:

@@ -8,6 +8,7 @@ differ.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -28,7 +29,7 @@ from potto.integrate.decomposition.meetings import (
     tangents,
 )
 from potto.integrate.levels import RESTING, LevelPlan
-from potto.integrate.pieces import mostly
+from potto.integrate.pieces import Evaluator, mostly, numbers_at
 from potto.integrate.rules.gauss import EPS
 from potto.integrate.rules.substitution import Segments, choose
 from potto.kernels.cells import Array, Bools, Cell, Ints, Value
@@ -72,11 +73,9 @@ class Cuts(Struct):
     unplaced: Ints | None = None
 
 
-def frame_rows(plan: LevelPlan, values: tuple[Value, ...]) -> tuple[Cell, Cell, list[Row]]:
-    cells = []
-    for value in values:
-        assert isinstance(value, Cell)
-        cells.append(value)
+def frame_rows(plan: LevelPlan, machine: Evaluator, env: Mapping[str, Value]) -> tuple[Cell, Cell, list[Row]]:
+    """The bounds of a variable, and the candidate cuts that have closed forms."""
+    cells = numbers_at(plan.frame, machine, env)
     rows = [
         Row(cell.v, cell.t, cut, turning, 0.0 if cell.e is None else cell.e, cell.et)  # type: ignore[arg-type]
         for cell, (cut, turning) in zip(cells[2:], plan.rows, strict=True)

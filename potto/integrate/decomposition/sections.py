@@ -22,7 +22,7 @@ from potto.integrate.decomposition.meetings import SEARCHED, Row, as_array
 from potto.integrate.decomposition.root_isolation import at_label, between, isolated
 from potto.integrate.events import BUDGET_SPENT, ROOTS_NOT_SEPARATED, TOO_MANY_ROOTS, Unsearched
 from potto.integrate.levels import LevelPlan
-from potto.integrate.pieces import gather, still
+from potto.integrate.pieces import Evaluator, gather, number_at, still
 from potto.integrate.rules.gauss import EPS
 from potto.kernels.cells import Array, Bools, Cell, Ints, Value, pad
 
@@ -38,7 +38,7 @@ BESIDE = 2.0**-27  # how far from a pole, as a part of where it is, it is asked 
 
 
 def searched_rows(
-    level: LevelPlan, env: dict[str, Value], lo: Cell, hi: Cell, batch: int, machine: Any, summed: bool = False
+    level: LevelPlan, env: dict[str, Value], lo: Cell, hi: Cell, batch: int, machine: Evaluator, summed: bool = False
 ) -> list[Row]:
     """The candidate cuts of one variable beyond the closed-form ones. summed: what is integrated is a sum over them, so
     that each counts as those do at which something jumps."""
@@ -52,22 +52,16 @@ def searched_rows(
     return rows
 
 
-def _call(function: Lam, env: dict[str, Value], machine: Any) -> Cell:
-    value = machine.evaluate(function, {n: env[n] for n in function.params}, None)
-    assert isinstance(value, Cell)
-    return value
-
-
-def _at(term: Term, variable: str, x: Any, env: dict[str, Value], machine: Any) -> Any:
+def _at(term: Term, variable: str, x: Any, env: dict[str, Value], machine: Evaluator) -> Any:
     """A term's value with the variable at x, by a machine without directions."""
     function = function_of(term)
     here = {n: still(v) for n, v in env.items() if n in function.params}
     here[variable] = Cell(x)
-    return _call(function, here, machine.with_directions(0)).v
+    return number_at(function, machine.with_directions(0), here).v
 
 
 def _family(
-    level: LevelPlan, cut: int, family: Any, env: dict[str, Value], lo: Cell, hi: Cell, batch: int, machine: Any
+    level: LevelPlan, cut: int, family: Any, env: dict[str, Value], lo: Cell, hi: Cell, batch: int, machine: Evaluator
 ) -> list[Row]:
     ends = [as_array(_at(family.inner, level.variable, x.v, env, machine), batch) for x in (lo, hi)]
     low, high = as_array(np.minimum(lo.v, hi.v), batch), as_array(np.maximum(lo.v, hi.v), batch)
@@ -93,7 +87,7 @@ def _family(
     for j in range(int(count)):
         here = dict(env)
         here[family.index] = pad(Cell(first + j), machine.directions)
-        root = _call(function, here, machine.tracking())
+        root = number_at(function, machine.tracking(), here)
         rows.append(Row(np.where(first + j <= last, root.v, np.nan), root.t, cut, turning, root.e, root.et))
     return rows
 
@@ -109,7 +103,7 @@ class _Along(Struct, frozen=True, dict=True):
     surface: Term
     variable: str
     env: dict[str, Value]
-    machine: Any
+    machine: Evaluator
 
     @cached_property
     def function(self) -> Lam:
@@ -121,7 +115,7 @@ class _Along(Struct, frozen=True, dict=True):
         return {n: still(v) for n, v in self.env.items() if n in self.function.params}
 
     def value(self, x: Array) -> Array:
-        found = _call(self.function, {**self.still, self.variable: Cell(x)}, self.machine.with_directions(0))
+        found = number_at(self.function, self.machine.with_directions(0), {**self.still, self.variable: Cell(x)})
         return np.broadcast_to(found.v, x.shape)
 
     def searched(self, low: Array, high: Array) -> list[Row]:
@@ -133,7 +127,7 @@ class _Along(Struct, frozen=True, dict=True):
         else:
             brackets = isolated(
                 self.surface, slope, self.variable, self.env, low, high, self.decides, self.machine.backend,
-                self.machine.isolates, self.machine.record.isolated,
+                self.machine.isolates, self.machine.isolated,
             )  # fmt: skip
             most = brackets.owner.size if self.decides else MOST_KINKS * batch
             if not brackets.complete and self.machine.overdrawn():  # more of it might help
@@ -155,7 +149,7 @@ class _Along(Struct, frozen=True, dict=True):
         if not empty.any():
             return []
         tracked = self.machine.tracking().with_directions(0)
-        at = _call(self.function, {**self.still, self.variable: Cell(x)}, tracked)
+        at = number_at(self.function, tracked, {**self.still, self.variable: Cell(x)})
         on: Any = empty & (np.abs(at.v) <= (0.0 if at.e is None else at.e))
         return [self.moving(np.where(on, x, np.nan), np.zeros(x.size))] if on.any() else []
 
@@ -209,7 +203,7 @@ class _Along(Struct, frozen=True, dict=True):
 
         def psi(x: Array, of: Ints) -> tuple[Array, Array]:
             here = {**gather(env, of), self.variable: Cell(x, None, (1.0,))}
-            value = _call(self.function, here, one)
+            value = number_at(self.function, one, here)
             slope = 0.0 if value.t[0] is None else value.t[0]
             return np.broadcast_to(value.v, x.shape), np.broadcast_to(slope, x.shape)
 
@@ -242,7 +236,7 @@ class _Along(Struct, frozen=True, dict=True):
         machine = self.machine.tracking() if tracking else self.machine
         here = {n: pad(v, k + 1) for n, v in self.env.items() if n in self.function.params}
         here[self.variable] = Cell(x, None, (None,) * k + (1.0,))
-        return _call(self.function, here, machine.with_directions(k + 1))
+        return number_at(self.function, machine.with_directions(k + 1), here)
 
     def moving(self, root: Array, within: Array) -> Row:
         """The root as a candidate cut: dx = -psi_theta / psi_x; how far it is off is psi's own rounding over psi_x.
@@ -250,7 +244,8 @@ class _Along(Struct, frozen=True, dict=True):
         Where psi changes its sign by a jump, or a pole, it is off by no more than the bracket is wide.
         """
         k, value = self.machine.directions, self.with_slopes(root, True)
-        slope = 0.0 if value.t[k] is None else value.t[k]
+        slope = value.t[k]
+        slope = 0.0 if slope is None else slope
         with np.errstate(all="ignore"):
             rounding, step = 0.0 if value.e is None else value.e, SEARCHED * EPS * np.abs(root)
             off = (np.abs(value.v) + rounding) / np.abs(slope)

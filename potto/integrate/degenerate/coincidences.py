@@ -23,7 +23,7 @@ from potto.integrate.decomposition.meetings import Meeting, SurfaceOnBound, as_a
 from potto.integrate.degenerate.scene import IteratedVariable, all_subsets
 from potto.integrate.events import Spot, SurfaceFold, TwoSided, on_a_bound
 from potto.integrate.levels import LevelPlan
-from potto.integrate.pieces import Sums, components, still
+from potto.integrate.pieces import Sums, numbers_at, still
 from potto.integrate.rules.gauss import EPS
 from potto.integrate.rules.substitution import Segments
 from potto.kernels.cells import Array, Bools, Cell, Ints
@@ -144,8 +144,8 @@ def _apart(scene: IteratedVariable, owner: Ints) -> Ints:
 def _reach(scene: IteratedVariable, level: LevelPlan) -> Array:
     """How far the range of a variable further out goes, for each of a batch."""
     quiet = scene.machine.with_directions(0)
-    ends = quiet.evaluate(level.bounds, {n: still(scene.env[n]) for n in level.bounds.params}, None)
-    lo, hi = (as_array(cell.v, scene.batch) for cell in components(ends))
+    ends = numbers_at(level.bounds, quiet, {n: still(scene.env[n]) for n in level.bounds.params})
+    lo, hi = (as_array(cell.v, scene.batch) for cell in ends)
     return np.abs(hi - lo)
 
 

@@ -15,10 +15,10 @@ from potto.integrate.degenerate.faces import THIN, Place, crossing, running, run
 from potto.integrate.degenerate.scene import IteratedVariable, around, placed
 from potto.integrate.events import Degenerate
 from potto.integrate.panels.panel_batch import PanelBatch
-from potto.integrate.pieces import Crossing, Pieces, take
+from potto.integrate.pieces import Crossing, Pieces, numbers_at, take
 from potto.integrate.rules.gauss import EPS
 from potto.integrate.rules.substitution import LINEAR, Segments
-from potto.kernels.cells import Array, Bools, Cell, Ints, Mask
+from potto.kernels.cells import Array, Bools, Ints, Mask
 
 # How far beside a place it is looked at (beside a bound twice), and what part may be lost across it.
 BESIDE, DISCONTINUITY = (1e-7, 1e-9), 1e-6
@@ -187,10 +187,7 @@ def _bends(scene: IteratedVariable, owner: Ints, x: Array, upper: bool) -> bool:
         return False
     aside = BESIDE[1] * (1 + np.abs(x)) * (-1 if upper else 1)
     places = (placed(scene.level, owner, place, scene.env, {})[0] for place in (x, x + aside))
-    on, inside = (frozen.evaluate(further.frame, {n: at[n] for n in further.frame.params}, None) for at in places)
-    assert isinstance(on, tuple) and isinstance(inside, tuple)
-    for row, beside in zip(on, inside, strict=True):
-        assert isinstance(row, Cell) and isinstance(beside, Cell)
+    for row, beside in zip(*(numbers_at(further.frame, frozen, at) for at in places), strict=True):
         with np.errstate(invalid="ignore"):
             slow = np.abs(row.v - beside.v) <= SLOW * (1 + np.abs(row.v))
         if not np.all(slow):

@@ -20,7 +20,7 @@ from msgspec import Struct
 from potto.core.terms import Lam, Term, children, function_of
 from potto.integrate.columns import distinct
 from potto.integrate.degenerate.scene import CLEAR, IteratedVariable
-from potto.integrate.pieces import Crossing, Evaluator, components, gather, still, take
+from potto.integrate.pieces import Crossing, Evaluator, components, gather, number_at, numbers_at, still, take
 from potto.integrate.plan import Plan
 from potto.integrate.rules.gauss import EPS
 from potto.kernels.cells import Array, Bools, Cell, Ints, Mask, Number, Value, pad
@@ -75,8 +75,7 @@ class Face(Struct, frozen=True, dict=True):
         x = env[self.variable]
         assert isinstance(x, Cell)
         moving[self.variable] = Cell(x.v, x.e, (None,) * k + (1.0,))
-        psi = machine.with_directions(k + 1).tracking().evaluate(self.psi, moving, None)
-        assert isinstance(psi, Cell)
+        psi = number_at(self.psi, machine.with_directions(k + 1).tracking(), moving)
         slope = np.asarray(psi.t[k])
         rise, blur = np.sign(slope), _size(psi.et[k]) / np.abs(slope)
         speeds = [(0.0 if t is None else -t / slope, _size(et) / np.abs(slope)) for t, et in zip(psi.t[:k], psi.et)]
@@ -177,12 +176,11 @@ def _running_along(scene: IteratedVariable, owner: Ints, x: Array, off: Array) -
     fraction, off = np.repeat(FRACTIONS, there.size), np.where(np.isfinite(off), off, 0.0) + EPS * np.abs(x)
     along, simple = [], []
     for level in further:
-        ends = quiet.evaluate(level.bounds, {n: here[n] for n in level.bounds.params}, None)
-        lo, hi = (np.broadcast_to(cell.v, many.shape) for cell in components(ends))
+        lo, hi = (np.broadcast_to(cell.v, many.shape) for cell in numbers_at(level.bounds, quiet, here))
         here[level.variable] = Cell(lo + fraction * (hi - lo), None, (None,))
         if any(level.turned) or not np.isfinite(lo + hi).all():
             return None
-        for psi in components(quiet.evaluate(level.surfaces, {n: here[n] for n in level.surfaces.params}, None)):
+        for psi in numbers_at(level.surfaces, quiet, here):
             parts = (np.broadcast_to(_size(part), many.shape) for part in (psi.v, psi.e, psi.t[0]))
             size, e, slope = (part.reshape(shape) for part in parts)
             steepest = slope.max(axis=1)

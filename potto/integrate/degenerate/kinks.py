@@ -12,7 +12,7 @@ from potto.core.terms import Term, function_of
 from potto.integrate.degenerate.scene import CLEAR, IteratedVariable
 from potto.integrate.degenerate.undefined import LOOKED_AT
 from potto.integrate.events import Along
-from potto.integrate.pieces import Evaluator, components, gather, still
+from potto.integrate.pieces import Evaluator, components, gather, numbers_at, still
 from potto.integrate.plan import Plan
 from potto.integrate.rules import substitution
 from potto.integrate.rules.substitution import Segments
@@ -29,9 +29,8 @@ def lying_along(plan: Plan, env: dict[str, Value], batch: int, machine: Evaluato
     there; with the members for which they do."""
     owner, quiet = _owners(batch), machine.apart().tracking()
     here = _places(plan, env, owner, batch, quiet)
-    found = quiet.evaluate(plan.kinks, {n: here[n] for n in plan.kinks.params}, None)
     met = []
-    for number, kink in enumerate(components(found)):
+    for number, kink in enumerate(components(quiet.evaluate(plan.kinks, here, None))):
         members = _resting_at_0(kink, owner)
         if members.size:
             met.append((number, members))
@@ -49,7 +48,7 @@ def on_bounds(plan: Plan, env: dict[str, Value], batch: int, machine: Evaluator)
         for upper in (False, True) if along else ():
             here = _places(plan, env, owner, batch, quiet, (number, upper))
             for surface in along:
-                value = quiet.evaluate(function_of(surface), {n: here[n] for n in surface.free}, None)
+                value = quiet.evaluate(function_of(surface), here, None)
                 members = _resting_at_0(value, owner) if isinstance(value, Cell) else owner[:0]
                 there = met.setdefault((level.variable, surface), np.zeros(batch, dtype=bool))
                 there[members] = True
@@ -69,11 +68,11 @@ def _places(
     here = gather({name: pad(value, machine.directions) for name, value in env.items()}, owner) if batch > 1 else env
     for number, level in enumerate(plan.levels):
         if at is not None and number == at[0]:
-            ends = components(machine.evaluate(level.bounds, {n: here[n] for n in level.bounds.params}, None))
+            ends = numbers_at(level.bounds, machine, here)
             here = {**here, level.variable: pad(ends[at[1]], machine.directions)}
             continue
         resting = {n: still(here[n]) for n in level.bounds.params}
-        ends = components(machine.evaluate(level.bounds, resting, None))
+        ends = numbers_at(level.bounds, machine, resting)
         lo, hi = (np.broadcast_to(end.v, owner.shape) for end in ends)
         part = (0.5 + np.arange(1, owner.size // batch + 1) * STEPS[number % STEPS.size]) % 1.0
         x = _between(lo, hi, np.tile(part, batch))
@@ -100,8 +99,8 @@ def note_flat(scene: IteratedVariable, seg: Segments, flat: dict[int, Bools]) ->
     for share in LOOKED_AT:
         x, _, _ = substitution.points(seg.pick(index), np.full((index.size, 1), share))
         here = {n: pad(v, machine.directions) for n, v in {**env, level.variable: Cell(x[:, 0])}.items()}
-        values = machine.tracking().evaluate(level.surfaces, {n: here[n] for n in level.surfaces.params}, None)
-        moves |= np.stack([_moves(value, owner.size) for value in components(values)])
+        values = numbers_at(level.surfaces, machine.tracking(), here)
+        moves |= np.stack([_moves(value, owner.size) for value in values])
     for group, along in zip(level.decided, moves, strict=True):
         there = owner[along & flat[group][index]] if group in flat else owner[:0]
         there = there[scene.counted(there)]

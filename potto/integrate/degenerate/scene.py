@@ -16,7 +16,7 @@ from potto.core.terms import Term
 from potto.integrate.decomposition.meetings import as_array
 from potto.integrate.levels import LevelPlan
 from potto.integrate.panels.iterated import Iterated
-from potto.integrate.pieces import Evaluator, gather, mostly, still, take
+from potto.integrate.pieces import Evaluator, gather, mostly, numbers_at, still, take
 from potto.integrate.rules.gauss import EPS
 from potto.kernels.cells import Array, Bools, Cell, Ints, Mask, Value, pad
 
@@ -199,11 +199,9 @@ def _with_slopes(level: LevelPlan, here: dict[str, Value], count: int, machine: 
     """Of each surface its values, their rounding, and how they change in the one direction that there may be: (G, 3,
     B)."""
     env = {n: pad(here[n], machine.directions) for n in level.surfaces.params}
-    values = machine.tracking().evaluate(level.surfaces, env, None)
-    assert isinstance(values, tuple)
+    values = numbers_at(level.surfaces, machine.tracking(), env)
     found = np.zeros((len(values), 3, count))
     for own, value in zip(found, values, strict=True):
-        assert isinstance(value, Cell)
         own[0] = value.v
         if value.e is not None:
             own[1] = value.e

@@ -17,7 +17,7 @@ from potto.integrate.decomposition.vanishing import vanishes
 from potto.integrate.degenerate.scene import IteratedVariable, placed, surfaces_at
 from potto.integrate.events import undefined
 from potto.integrate.levels import LevelPlan
-from potto.integrate.pieces import Evaluator, gather, still, take
+from potto.integrate.pieces import Evaluator, gather, number_at, still, take
 from potto.integrate.plan import Plan
 from potto.integrate.rules import substitution
 from potto.integrate.rules.substitution import Segments
@@ -83,8 +83,7 @@ def fallen(
     for group in plan.groups:
         if group.number in groups:
             function = function_of(group.cut.surface)
-            value = machine.with_directions(0).evaluate(function, {p: still(env[p]) for p in function.params}, None)
-            assert isinstance(value, Cell)
+            value = number_at(function, machine.with_directions(0), {p: still(env[p]) for p in function.params})
             at = np.broadcast_to(value.v, (n,))
             yield group.number, at >= 0 if group.up_at_zero else at > 0, np.isnan(at)
 

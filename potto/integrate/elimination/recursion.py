@@ -101,17 +101,17 @@ def _weighted(further: bool, counts: tuple[int, ...]) -> Lam:
 
 
 def one_by_one(
-    known: Eliminated, plan: Plan, machine: Any, env: dict[str, Value], affordable: int = AFFORDABLE
+    known: Eliminated, plan: Plan, machine: Evaluator, env: dict[str, Value], affordable: int = AFFORDABLE
 ) -> Sums | None:  # fmt: skip
     """The integral, each step from the table of the next; None where one can't be made, or it takes more evaluations
     than can be afforded. plan: of the integral as a whole, which tells how much of an infinite range matters."""
     found, left_out = reaches(plan, env, range(len(plan.levels)))
     ranges = {name: (float(low[0]), float(high[0])) for name, (low, high) in found.items()}
     settings, best, least = machine.settings, None, math.inf
-    most = min(settings.max_evals, int(machine.record.spent) + affordable)
+    most = min(settings.max_evals, int(machine.spent) + affordable)
     for share in SHARES:
         finer = replace(settings, rtol=max(share * settings.rtol, FINEST), atol=0.0, max_evals=most)
-        sums = _passed_on(known, machine.changed(settings=finer), env, ranges, {})
+        sums = _passed_on(known, machine.asked(finer), env, ranges, {})
         if not isinstance(sums, Sums):
             break
         sums.e += left_out
@@ -202,7 +202,8 @@ def _hints(tables: Sequence[InterpolantTable]) -> Iterator[Cell]:
 
 
 def _table(
-    iteration: Iteration, state: LevelPlan, span: tuple[float, float], machine: Any, env: dict[str, Value], even: bool
+    iteration: Iteration, state: LevelPlan, span: tuple[float, float], machine: Evaluator, env: dict[str, Value],
+    even: bool,
 ) -> InterpolantTable | None:  # fmt: skip
     env = {**env, LOW: Cell(span[0]), HIGH: Cell(span[1])}
     found, _ = iteration.cut(state, env, 1, machine, np.zeros(1, dtype=np.int64))

@@ -1,6 +1,6 @@
 """Sums over the nodes of cells whose ends are formulas: values and tangents, with the rounding of both.
 
-Owns `summed`, `product`, `any_moves`, `MovingTotals` and `evaluated`. Nodes move with the ends of their cells, so that
+Owns `summed`, `product`, `any_moves` and `MovingTotals`. Nodes move with the ends of their cells, so that
 the tangent of the sum is the derivative of the integral. Blocks of numbers have values in row 0 and tangents in rows
 1 ... k of their first axis; the nodes of the variables, (P, n2, n3), are their last axes: P those of the outermost
 variable, cell after cell.
@@ -16,7 +16,7 @@ import numpy as np
 from msgspec import Struct
 
 from potto.core.terms import Lam, function_of
-from potto.integrate.pieces import Evaluator, gather
+from potto.integrate.pieces import Evaluator, gather, number_at, numbers_at
 from potto.integrate.rules.gauss import EPS, gauss
 from potto.integrate.rules.proved_orders import Region
 from potto.kernels.cells import Array, Cell, Ints, Value
@@ -25,13 +25,6 @@ from potto.kernels.cells import Array, Cell, Ints, Value
 Put = Callable[[int, tuple[Cell, ...]], tuple[Cell, ...]]
 # The rounding of a sum of products, in units of the last place.
 SUMMED = 4 * EPS
-
-
-def evaluated(function: Lam, machine: Evaluator, env: dict[str, Value]) -> tuple[Cell, ...]:
-    """The numbers of a function to a tuple of them, whose parameters have the values of `env`."""
-    values = machine.evaluate(function, env, None)
-    assert isinstance(values, tuple)
-    return values  # type: ignore[return-value]
 
 
 class _Layout(Struct, frozen=True):
@@ -99,7 +92,7 @@ def summed(
     length = rounded = layout.weights
     for i, variable in enumerate(variables):
         if i:
-            frame = evaluated(frames[i], tracked, here)
+            frame = numbers_at(frames[i], tracked, here)
         if put is not None:
             frame = put(i, frame)
         block = _block(frame, k, shape) if i else _numbers(frame, k)
@@ -205,8 +198,7 @@ def _integrand(layout: _Layout, machine: Evaluator, here: dict[str, Value], shap
     out = np.zeros((3, 1 + machine.directions, *shape))
     for function, index in layout.faces:
         env = here if index is None else gather({n: here[n] for n in function.params}, index)
-        cell = machine.evaluate(function, env, None)
-        assert isinstance(cell, Cell)
+        cell = number_at(function, machine, env)
         for part, numbers in enumerate(((cell.v, *cell.t), (cell.e, *cell.et))):
             for row, number in enumerate(numbers):
                 if number is not None:

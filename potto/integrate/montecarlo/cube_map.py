@@ -22,7 +22,7 @@ from potto.core.terms import Term, function_of, mul, var
 from potto.integrate.decomposition.cuts import frame_rows
 from potto.integrate.decomposition.meetings import as_array
 from potto.integrate.levels import LevelPlan
-from potto.integrate.pieces import still
+from potto.integrate.pieces import Evaluator, number_at, numbers_at, still
 from potto.integrate.plan import Plan
 from potto.integrate.rules.gauss import EPS
 from potto.kernels.cells import Array, Bools, Cell, Number, Value, map_arrays, pad
@@ -41,7 +41,7 @@ class Chart(Struct, frozen=True):
     """The chart of one plan, for one set of parameters. share: the least part of the points for a stretch of labels."""
 
     plan: Plan
-    machine: Any
+    machine: Evaluator
     env: dict[str, Value]
     share: float = 0.0
 
@@ -82,7 +82,7 @@ class Chart(Struct, frozen=True):
                 x = Cell(x.v, None, tuple(None if d < self.machine.directions else y for d, y in enumerate(x.t)))
             env[level.variable] = x
             for factor in (length,) if weight is None else (length, Cell(weight)):
-                volume = machine.evaluate(PRODUCT, {"a": volume, "b": factor}, None)
+                volume = number_at(PRODUCT, machine, {"a": volume, "b": factor})
         return Point(env, volume)
 
     def crowded(self, level: LevelPlan, env: dict[str, Value], u: Array) -> tuple[Array, Array | None]:
@@ -90,9 +90,7 @@ class Chart(Struct, frozen=True):
         if not level.rows:
             return u, None
         here = {name: still(env[name]) for name in level.frame.params}
-        values = self.machine.with_directions(0).evaluate(level.frame, here, None)
-        assert isinstance(values, tuple)
-        lo, hi, rows = frame_rows(level, values)
+        lo, hi, rows = frame_rows(level, self.machine.with_directions(0), here)
         with np.errstate(invalid="ignore", over="ignore"):
             cuts = [label_of(lo, hi, row.x) for row in rows if row.cut >= 0]
         inside = [np.fmin(np.fmax(cut, 0.0), 1.0) for cut in cuts]
@@ -103,13 +101,10 @@ class Chart(Struct, frozen=True):
         """The points at which a surface is not negative."""
         function = function_of(surface)
         here = {name: still(env[name]) for name in function.params}
-        return as_array(self.machine.with_directions(0).evaluate(function, here, None).v, n) >= 0
+        return as_array(number_at(function, self.machine.with_directions(0), here).v, n) >= 0
 
-    def bounds(self, level: LevelPlan, env: dict[str, Value], machine: Any) -> tuple[Cell, Cell]:
-        values = machine.evaluate(level.bounds, {p: env[p] for p in level.bounds.params}, None)
-        assert isinstance(values, tuple)
-        lo, hi = values
-        assert isinstance(lo, Cell) and isinstance(hi, Cell)
+    def bounds(self, level: LevelPlan, env: dict[str, Value], machine: Evaluator) -> tuple[Cell, Cell]:
+        lo, hi = numbers_at(level.bounds, machine, env)
         return (_held(lo), _held(hi)) if self.machine.frozen else (lo, hi)
 
 

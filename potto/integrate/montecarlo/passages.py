@@ -13,8 +13,8 @@ from msgspec import Struct
 from potto.core.terms import App, Branch, Const, If, Prim, Term, function_of, postorder
 from potto.integrate.decomposition.meetings import as_array
 from potto.integrate.montecarlo.cube_map import Chart
-from potto.integrate.pieces import still
-from potto.kernels.cells import Array, Bools, Cell, Ints, Number
+from potto.integrate.pieces import number_at, still
+from potto.kernels.cells import Array, Bools, Ints, Number
 from potto.primitives import PRIMITIVES
 
 # How far from a root, in labels, a surface has the signs that it goes from and to; where they are one sign, nearer.
@@ -73,8 +73,7 @@ class Passage(Struct, dict=True):
         point = self.chart.place(start, moved, 0, self.number + 1, directions=0)
         function = function_of(self.term)
         machine = self.chart.machine.with_directions(0).tracking()
-        value = machine.evaluate(function, {name: still(point.env[name]) for name in function.params}, None)
-        assert isinstance(value, Cell)
+        value = number_at(function, machine, {name: still(point.env[name]) for name in function.params})
         error = 0.0 if value.e is None else value.e
         return np.where(np.abs(value.v) > error, np.sign(as_array(value.v, u.size)), 0.0)
 

@@ -29,7 +29,7 @@ from potto.integrate.degenerate.undefined import fallen
 from potto.integrate.levels import HINT
 from potto.integrate.montecarlo.cube_map import Chart, Point, label_of
 from potto.integrate.montecarlo.surface_terms import Surface
-from potto.integrate.pieces import Evaluator, Sums, still
+from potto.integrate.pieces import Evaluator, Sums, numbers_at, still
 from potto.integrate.plan import Plan
 from potto.kernels.cells import Array, Cell, Mask, Value
 
@@ -115,12 +115,11 @@ def peaks(chart: Chart, drawn: int, f: Callable[[Any, int], Sums], seed: int) ->
     return Sums(v, np.zeros_like(v), t, np.zeros_like(t))
 
 
-def _center(chart: Chart, number: int, env: dict[str, Any], random: np.random.Generator, n: int) -> Array:
+def _center(chart: Chart, number: int, env: dict[str, Value], random: np.random.Generator, n: int) -> Array:
     """The label of one of the centers of a variable for each member, whichever; nan where there is none."""
     level = chart.plan.levels[number]
     machine = chart.machine.with_directions(0)
-    values = machine.evaluate(level.frame, {name: still(env[name]) for name in level.frame.params}, None)
-    lo, hi, *roots = values
+    lo, hi, *roots = numbers_at(level.frame, machine, {name: still(env[name]) for name in level.frame.params})
     rows = [as_array(root.v, n) for root, (cut, _) in zip(roots, level.rows, strict=True) if cut == HINT]
     chosen = np.stack(rows)[random.integers(0, len(rows), n), np.arange(n)]
     return label_of(lo, hi, chosen)

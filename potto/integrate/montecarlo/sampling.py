@@ -34,12 +34,13 @@ from potto.integrate.montecarlo.rare_events import (
 )
 from potto.integrate.montecarlo.replicates import Moments, Replicates, added
 from potto.integrate.montecarlo.surface_terms import Surface, factors
-from potto.integrate.pieces import Sums, dense, gather, take
+from potto.integrate.pieces import Evaluator, Sums, dense, gather, take
 from potto.integrate.plan import Plan
 from potto.integrate.rules.gauss import EPS
 from potto.integrate.rules.sobol import MOST, Sobol
 from potto.kernels.cells import Array, Cell, Mask, Value, map_arrays
 from potto.kernels.memory import kept
+from potto.projects.settings import Settings
 
 SIGMAS = 4.0  # a reported error in standard errors: too small once in 16,000 times
 REPLICATES = 16
@@ -70,7 +71,7 @@ Told = Callable[[float], None]  # how much of the work is done
 Mean = tuple[int, Callable[[Array], Sums]]
 
 
-def sample(plan: Plan, machine: Any, env: dict[str, Value], batch: int, method: str) -> Sums:
+def sample(plan: Plan, machine: Evaluator, env: dict[str, Value], batch: int, method: str) -> Sums:
     """Estimate the integrals of a batch one after the other; each from the same seed.
 
     "auto" stops where the accuracy asked for is reached; otherwise all `samples` are taken.
@@ -91,7 +92,7 @@ def sample(plan: Plan, machine: Any, env: dict[str, Value], batch: int, method: 
     return Sums.joined([Sums(*(x[..., None] for x in (r.v, r.e, r.t, r.et))) for r in rows])
 
 
-def _plain(plan: Plan, machine: Any, env: dict[str, Value], told: Told) -> Sums:
+def _plain(plan: Plan, machine: Evaluator, env: dict[str, Value], told: Told) -> Sums:
     """Independent points: the means' variances add up, and the errors that integrands come with."""
     generator = np.random.default_rng(machine.settings.seed)
     run = _Run(plan, machine, env, 0)
@@ -99,7 +100,7 @@ def _plain(plan: Plan, machine: Any, env: dict[str, Value], told: Told) -> Sums:
     rare: list[Sums] = []
     means = list(run.means())
     each = 1 + SIDES * (len(means) - 1)
-    afforded = int((machine.settings.max_evals - machine.record.spent) / each)
+    afforded = int((machine.settings.max_evals - machine.spent) / each)
     count = min(machine.settings.samples, max(afforded, LEAST))
     fewest = count
     for number, (dims, f) in enumerate(means):
@@ -127,7 +128,7 @@ def _plain(plan: Plan, machine: Any, env: dict[str, Value], told: Told) -> Sums:
     return mean
 
 
-def _say_if_cut(sums: Sums, machine: Any, cut: bool) -> None:
+def _say_if_cut(sums: Sums, machine: Evaluator, cut: bool) -> None:
     """Say that more samples were asked for than evaluations allowed, where they would be wanted."""
     if (cut or machine.exhausted()) and not _enough(sums, machine.settings, machine.settings.asked(True)):
         machine.note(BUDGET_SPENT)
@@ -139,7 +140,7 @@ def _random(generator: np.random.Generator, count: int, dims: int) -> Iterator[A
         yield generator.random((min(CHUNK, count - start), dims))
 
 
-def _quasi(plan: Plan, machine: Any, env: dict[str, Value], method: str, told: Told) -> Sums:
+def _quasi(plan: Plan, machine: Evaluator, env: dict[str, Value], method: str, told: Told) -> Sums:
     """Scrambled Sobol points, twice as many until there are as many as asked for, or enough of them."""
     settings = machine.settings
     run = _Run(plan, machine, env, min(EXACT, len(plan.levels) - 1))
@@ -148,7 +149,7 @@ def _quasi(plan: Plan, machine: Any, env: dict[str, Value], method: str, told: T
     found = Replicates(REPLICATES, STUDENT)
     count = 1 << min(max(4, int(np.log2(max(settings.samples // REPLICATES, 16)))), MOST)
     run.largest = [Largest() for _ in means]
-    done, size, before, cut = 0, min(FIRST, count), machine.record.spent, False
+    done, size, before, cut = 0, min(FIRST, count), machine.spent, False
     while size > 1 and size * REPLICATES * NODES * len(means) > settings.max_evals - before:
         size //= 2
     while done < count:
@@ -174,14 +175,14 @@ def _quasi(plan: Plan, machine: Any, env: dict[str, Value], method: str, told: T
             sums.e, sums.et = sums.e + rare.v, sums.et + rare.t
         if method == "auto" and _enough(sums, settings, settings.rtol):
             break
-        if cut := done < count and 2 * machine.record.spent - before > settings.max_evals:
+        if cut := done < count and 2 * machine.spent - before > settings.max_evals:
             break
     run.look(sums)
     _say_if_cut(sums, machine, cut)
     return sums
 
 
-def _enough(sums: Sums, settings: Any, rtol: float) -> bool:
+def _enough(sums: Sums, settings: Settings, rtol: float) -> bool:
     return all(
         bool((e <= np.maximum(settings.atol, rtol * np.abs(x))).all()) for x, e in ((sums.v, sums.e), (sums.t, sums.et))
     )
@@ -191,7 +192,7 @@ class _Run(Struct, dict=True):
     """One integral, for one set of parameters; `exact`: how many of its innermost variables are left to quadrature."""
 
     plan: Plan
-    machine: Any
+    machine: Evaluator
     env: dict[str, Value]
     exact: int
     largest: list[Largest] = []
@@ -229,7 +230,7 @@ class _Run(Struct, dict=True):
         groups = (g for s in self.surfaces if s.number >= self.drawn for g, _ in s.forces)
         resting = frozenset(self.plan.groups[g].cut.surface for g in groups)
         settings = self.machine.settings
-        machine = self.machine.changed(settings=replace(settings, rtol=max(settings.rtol, INNER_RTOL)))
+        machine = self.machine.asked(replace(settings, rtol=max(settings.rtol, INNER_RTOL)))
         return Iteration(self.plan, machine, INNER_ORDER, resting)
 
     def means(self) -> Iterator[Mean]:
@@ -346,7 +347,7 @@ class _Run(Struct, dict=True):
         """The same with every variable at a point."""
         k, body = self.machine.directions, self.plan.body
         self.machine.count(n)
-        value = self.machine.evaluate(body, {p: point.env[p] for p in body.params}, self.plan.trace(sides))
+        value = self.machine.evaluate(body, point.env, self.plan.trace(sides))
         numbers, errors = dense(value, k, (n,))
         errors = np.zeros(numbers.shape) if errors is None else errors
         (f, ft), (e, et) = ((x[:, 0], x[:, 1:]) for x in (numbers, errors))

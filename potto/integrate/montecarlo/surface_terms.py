@@ -38,7 +38,7 @@ from potto.integrate.montecarlo.cube_map import Chart, Point, label_of
 from potto.integrate.montecarlo.lines import End, Line, label_name, leaving, line, offset
 from potto.integrate.montecarlo.passages import ASIDE, Passage
 from potto.integrate.montecarlo.pivot_choice import pivots
-from potto.integrate.pieces import Sums, still
+from potto.integrate.pieces import Sums, number_at, still
 from potto.integrate.plan import Plan
 from potto.integrate.rules.gauss import EPS
 from potto.kernels.cells import Array, Bools, Cell, Mask, Value, pad
@@ -120,9 +120,7 @@ class Surface(Struct, dict=True):
             values = [0.0, 0.0]
             for i, bound in enumerate((level.level.lo, level.level.hi)):
                 if not bound.free & names:
-                    function = function_of(bound)
-                    value = machine.evaluate(function, {p: env[p] for p in function.params}, None)
-                    values[i] = float(np.ravel(value.v)[0])
+                    values[i] = float(np.ravel(number_at(function_of(bound), machine, env).v)[0])
             infinite = [i for i in (0, 1) if np.isinf(values[i])]
             found.append((infinite[0], values[infinite[0]]) if len(infinite) == 1 else None)
         return tuple(found)
@@ -192,9 +190,7 @@ class Surface(Struct, dict=True):
                 weight = more if weight is None else weight if more is None else weight * more
             point = self.chart.place(point, labels, number, number + 1, directions=0)
         assert along.plan is not None
-        values = machine.tracking().evaluate(along.plan.frame, {p: point.env[p] for p in along.plan.frame.params}, None)
-        assert isinstance(values, tuple)
-        lo, hi, rows = frame_rows(along.plan, values)
+        lo, hi, rows = frame_rows(along.plan, machine.tracking(), point.env)
         return lo, hi, rows + searched_rows(along.plan, point.env, lo, hi, n, machine, summed=True), weight
 
     def at(
@@ -366,8 +362,7 @@ class Surface(Struct, dict=True):
         at all points."""
         function = function_of(phi)
         env = {name: pad(point.env[name], wide) for name in function.params}
-        value = self.machine.with_directions(wide).evaluate(function, env, None)
-        assert isinstance(value, Cell)
+        value = number_at(function, self.machine.with_directions(wide), env)
         t = np.broadcast_arrays(*(0.0 if x is None else x for x in value.t or (None,) * wide))
         return as_array(value.v, n), np.stack(t).reshape(wide, -1)
 

@@ -7,7 +7,7 @@ else. Calls, lazy sides, sums and integrals of generated code come here.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
@@ -37,6 +37,7 @@ from potto.core.terms import (
 from potto.core.terms import Delta as DeltaTerm
 from potto.diagnostics import PottoError
 from potto.integrate.costs import Costs
+from potto.integrate.decomposition.root_isolation import Isolated
 from potto.integrate.events import NO_SECOND_DERIVATIVE, Event, Events, Members
 from potto.kernels import errors
 from potto.kernels.cells import Cell, Ints, Number, Pattern, Trace, Value, pad, pattern
@@ -137,6 +138,10 @@ class Machine:
         other.__dict__.update(self.__dict__, **fields)
         return other
 
+    def asked(self, settings: Settings) -> Machine:
+        """The machine that is asked for something else."""
+        return self.changed(settings=settings)
+
     def with_directions(self, directions: int) -> Machine:
         if directions == self.directions and not self.taping:
             return self
@@ -188,6 +193,16 @@ class Machine:
         self.record.cells += cells
         return self.record.spent <= GIVEN_UP * self.settings.max_evals
 
+    @property
+    def isolated(self) -> Isolated:
+        """The roots that were found so far."""
+        return self.record.isolated
+
+    @property
+    def spent(self) -> float:
+        """What counts against the budget so far."""
+        return self.record.spent
+
     def exhausted(self) -> bool:
         return self.record.spent > self.settings.max_evals
 
@@ -210,7 +225,7 @@ class Machine:
 
     # Terms over batches
 
-    def evaluate(self, function: Lam, env: dict[str, Value], trace: Trace | None) -> Value:
+    def evaluate(self, function: Lam, env: Mapping[str, Value], trace: Trace | None) -> Value:
         """The value of a function of free variables (in sorted order) in an environment."""
         return self.run(function, [env[p] for p in function.params], trace)
 

@@ -26,7 +26,7 @@ from potto.core.terms import Deriv, Integral, Lam, Term, Var, deriv, substitute,
 from potto.diagnostics import PottoError
 from potto.integrate.columns import run_of
 from potto.integrate.events import Events
-from potto.integrate.pieces import Sums, still
+from potto.integrate.pieces import Sums, number_at, still
 from potto.integrate.plan import Plan, inlined, make, numbers_in, unpacked_plan
 from potto.kernels.cells import Array, Bools, Cell, Ints, Value, map_arrays
 from potto.kernels.making import making
@@ -315,9 +315,7 @@ class Problem:
         if plan.premise is None:
             return np.ones(1, dtype=bool)
         env = {name: still(self.env[name]) for name in plan.premise.params}
-        found = self.machine.with_directions(0).evaluate(plan.premise, env, None)
-        assert isinstance(found, Cell)
-        return np.asarray(found.v) > 0
+        return np.asarray(number_at(plan.premise, self.machine.with_directions(0), env).v) > 0
 
     def decided(self, plain: Term) -> float | None:
         """The value of a plain term over parameters, where it is one number for the whole batch."""

@@ -23,7 +23,7 @@ from potto.core.terms import Branch, Integral, Lam, Term, function_of, postorder
 from potto.integrate.fixed.boxes.tensor_product import Bounds, BoxIntegrand
 from potto.integrate.fixed.lowered.box_text import NEAR
 from potto.integrate.fixed.straight import MOST_TERMS, StraightIntegral
-from potto.integrate.pieces import Evaluator, gather
+from potto.integrate.pieces import Evaluator, gather, numbers_at
 from potto.integrate.rules.intervals import Interval
 from potto.integrate.rules.lowered_intervals import enclosures
 from potto.kernels.cells import Array, Bools, Cell, Ints, Value, map_cells
@@ -159,11 +159,8 @@ def sides_of(box: Box, machine: Evaluator, env: dict[str, Value], batch: int) ->
 def _ends(box: Box, machine: Evaluator, env: Mapping[str, Value], batch: int) -> tuple[Array, Array] | None:
     """The lower and upper bounds of the variables, and how far they may be off, (2, variables, B) each; None if one
     moves."""
-    bounds = machine.evaluate(box.bounds, {n: env[n] for n in box.bounds.params}, None)
-    assert isinstance(bounds, tuple)
     ends, off = np.empty((2, 2, len(box.variables), batch))
-    for number, cell in enumerate(bounds):
-        assert isinstance(cell, Cell)
+    for number, cell in enumerate(numbers_at(box.bounds, machine, env)):
         if any(t is not None for t in cell.t):
             return None  # a bound that moves has boundary terms of its own
         ends[number % 2, number // 2] = cell.v
@@ -256,11 +253,7 @@ def _at_corners(
     here = {name: map_cells(env[name], lambda cell: Cell(cell.v, cell.e)) for name in function.params if name in env}
     for n, variable in enumerate(box.variables):
         here[variable] = Cell(np.stack([(low[n], high[n])[corner[n]] for corner in corners]))
-    tracking = machine.with_directions(0).tracking()
-    values = tracking.evaluate(function, {name: here[name] for name in function.params}, None)
-    assert isinstance(values, tuple)
-    for value in values:
-        assert isinstance(value, Cell)
+    for value in numbers_at(function, machine.with_directions(0).tracking(), here):
         at = np.broadcast_to(value.v, (len(corners), low.shape[1]))
         least, most = at.min(axis=0), at.max(axis=0)
         near = NEAR * np.maximum(np.abs(least), np.abs(most))

@@ -20,10 +20,9 @@ from potto.core.terms import children
 from potto.integrate.fixed.cells.product_rule import CALL, CANCELS, FEW, ProductRule, added_together, way_of
 from potto.integrate.fixed.cells.proved_shapes import proved_rules
 from potto.integrate.fixed.cells.topologies import Alike, topologies
-from potto.integrate.fixed.moving_sums import evaluated
 from potto.integrate.fixed.steps.step_batches import by_cells
 from potto.integrate.fixed.straight import MOST_CHOICES, StraightIntegral, in_rows
-from potto.integrate.pieces import Evaluator, Shaped, Sums, added_up, gather, together
+from potto.integrate.pieces import Evaluator, Shaped, Sums, added_up, gather, numbers_at, together
 from potto.kernels.cells import Array, Bools, Cell, Ints, Value
 
 # Nodes per variable that are tried, one after the other.
@@ -64,9 +63,7 @@ def by_shapes(
     if len(children(plan.choices.body)) > MOST_CHOICES:
         return None
     (done, short), sums = np.zeros((2, batch), dtype=bool), Sums.zeros(1, machine.directions, batch)
-    names = plan.choices.params
-    met = np.array([np.broadcast_to(cell.v, batch) for cell in
-                    evaluated(plan.choices, machine, {name: env[name] for name in names})])  # fmt: skip
+    met = np.array([np.broadcast_to(cell.v, batch) for cell in numbers_at(plan.choices, machine, env)])
     for sides in itertools.product((False, True), repeat=len(met)):  # what is not known is neither
         here = np.flatnonzero(np.all([row == side for row, side in zip(met, sides, strict=True)], axis=0))
         own = plan.decided(sides) if here.size else plan

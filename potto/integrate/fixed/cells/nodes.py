@@ -15,9 +15,9 @@ from msgspec import Struct
 from potto.core.terms import Term, function_of, tuple_
 from potto.integrate.fixed.axes import ENDS, Axis, Raw
 from potto.integrate.fixed.edges import EDGE, edges_of
-from potto.integrate.fixed.moving_sums import evaluated, product
+from potto.integrate.fixed.moving_sums import product
 from potto.integrate.fixed.straight import RowNumbers, StraightIntegral, rows_between
-from potto.integrate.pieces import Evaluator, dense, still
+from potto.integrate.pieces import Evaluator, dense, numbers_at, still
 from potto.integrate.rules.gauss import EPS
 from potto.kernels.cells import Array, Bools, Cell, Ints, Value, map_arrays
 
@@ -84,7 +84,7 @@ class _Cells(Struct, frozen=True):
         clear = np.ones(self.count, dtype=bool)
         widths = []
         for i, (variable, frame) in enumerate(zip(self.plan.variables, self.plan.frames, strict=True)):
-            values = evaluated(frame, machine, {name: here[name] for name in frame.params})
+            values = numbers_at(frame, machine, here)
             numbers, lost = dense(values, k, shape)
             ends = self.picked(numbers, i)
             lo, width = ends[0], ends[1] - ends[0]
@@ -108,7 +108,7 @@ class _Cells(Struct, frozen=True):
             )  # fmt: skip
             shape = at.shape[1:]
         function = function_of(self.face)
-        value, lost = dense(machine.evaluate(function, {name: here[name] for name in function.params}, None), k, shape)
+        value, lost = dense(machine.evaluate(function, here, None), k, shape)
         if tracked:
             clear &= self.clear_of_edges(machine.with_directions(0), here, shape)
         return Nodes(value[0], np.zeros(value[0].shape) if lost is None else lost[0], widths, clear)
@@ -129,7 +129,7 @@ class _Cells(Struct, frozen=True):
         if not found:
             return fine
         edges = function_of(tuple_(found))
-        for cell in evaluated(edges, machine, {name: still(here[name]) for name in edges.params}):
+        for cell in numbers_at(edges, machine, {name: still(here[name]) for name in edges.params}):
             size = np.broadcast_to(np.abs(cell.v), shape)[:, *_between(len(shape) - 2)].reshape(-1, shape[-1])
             fine &= size.min(axis=0) > EDGE * size.max(axis=0)
         return fine

@@ -18,9 +18,8 @@ from potto.core.terms import Term, children
 from potto.integrate.columns import distinct
 from potto.integrate.fixed.lowered.topologies import Found, lowered_topologies
 from potto.integrate.fixed.lowered.topology_text import FARTHEST
-from potto.integrate.fixed.moving_sums import evaluated
 from potto.integrate.fixed.straight import CLEAR, ROW_BITS, StraightIntegral, nothing, rows_between
-from potto.integrate.pieces import Evaluator, gather
+from potto.integrate.pieces import Evaluator, gather, numbers_at
 from potto.kernels.cells import Array, Bools, Cell, Ints, Number, Value
 
 LEAST = 2  # members, below which numbers are not columns for machine code
@@ -106,7 +105,7 @@ def _along(
 ) -> _Cells:  # fmt: skip
     """The stretches of one variable more, within those so far."""
     frame = plan.frames[i]
-    values = evaluated(frame, machine, {name: cells.env[name] for name in frame.params})
+    values = numbers_at(frame, machine, cells.env)
     places, off = _rows(values, cells.members.size)
     if merging:
         places[_again(plan, i, values, places)] = np.nan
@@ -133,7 +132,7 @@ def _sides(plan: StraightIntegral, machine: Evaluator, cells: _Cells, plain: Boo
     surfaces, codes = plan.surfaces, np.zeros(cells.members.size, dtype=np.int64)
     if children(surfaces.body):
         here = {name: cells.env[name] for name in surfaces.params}
-        for bit, cell in enumerate(evaluated(surfaces, machine, here)):
+        for bit, cell in enumerate(numbers_at(surfaces, machine, here)):
             unclear = ~(np.abs(cell.v) > CLEAR * (0.0 if cell.e is None else cell.e))
             plain[cells.members[np.broadcast_to(unclear, codes.shape)]] = False
             codes |= np.broadcast_to(np.asarray(cell.v) > 0, codes.shape).astype(np.int64) << bit

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from potto.core.terms import children
-from potto.integrate.fixed.moving_sums import MovingTotals, evaluated, summed
+from potto.integrate.fixed.moving_sums import MovingTotals, summed
 from potto.integrate.fixed.proved_sums.alone import machine_code, promotion, summed_alone
 from potto.integrate.fixed.proved_sums.on_bounds import OnBounds, Place, Tied
 from potto.integrate.fixed.proved_sums.settled import SettledRegion, accurate
@@ -29,7 +29,7 @@ from potto.integrate.fixed.steps.step_cells import step_cells
 from potto.integrate.fixed.steps.step_gradients import step_gradient
 from potto.integrate.fixed.steps.step_sums import SteppedCall
 from potto.integrate.fixed.straight import CLEAR, MOST_CHOICES, StraightIntegral, nothing
-from potto.integrate.pieces import Evaluator, Sums
+from potto.integrate.pieces import Evaluator, Sums, numbers_at
 from potto.integrate.rules.proved_orders import FrameCell as Stretch
 from potto.integrate.rules.proved_orders import Region
 from potto.kernels.cells import Cell, Value
@@ -75,7 +75,7 @@ def _cells(
             if not dark:
                 cells.append(Stretch(path, face))
             return
-        values = evaluated(plan.frames[i], tracked, here) if i else frame
+        values = numbers_at(plan.frames[i], tracked, here) if i else frame
         for low, high, middle, length in _stretches(plan, i, tracked, values, ties):
             here[plan.variables[i]] = Cell(middle)
             shortest = min(shortest, length or math.inf)
@@ -135,7 +135,7 @@ def _sides(plan: StraightIntegral, machine: Evaluator, env: dict[str, Value]) ->
     if not children(plan.surfaces.body):
         return ()
     sides = []
-    for cell in evaluated(plan.surfaces, machine, env):
+    for cell in numbers_at(plan.surfaces, machine, env):
         x = float(cell.v)
         if not abs(x) > CLEAR * float(cell.e or 0.0):
             raise _NotPlain
@@ -167,7 +167,7 @@ def beside_bounds(plan: StraightIntegral, machine: Evaluator, env: dict[str, Val
     plan, values = _decided(plan, machine, env)
     if values is None or machine.frozen or machine.side or machine.costs is not None or machine.directions > 1:
         return None
-    frame = evaluated(plan.frames[0], machine.tracking(), env)
+    frame = numbers_at(plan.frames[0], machine.tracking(), env)
     ties = OnBounds()
 
     def total(inside: frozenset[Any]) -> MovingTotals:
@@ -266,7 +266,7 @@ def _summed(plan: StraightIntegral, machine: Evaluator, env: dict[str, Value]) -
     plan, values = _decided(plan, machine, env)
     if values is None:
         return None
-    frame = evaluated(plan.frames[0], machine.tracking(), env)
+    frame = numbers_at(plan.frames[0], machine.tracking(), env)
     reach, rtol = float(frame[1].v - frame[0].v), min(machine.rtol, LOOSEST)
     region = found.region if certain and (found := known(plan, values, reach, rtol)) else None
     if region is None:
@@ -300,7 +300,7 @@ def settled(plan: StraightIntegral, machine: Evaluator, env: dict[str, Value]) -
     plan, values = _decided(plan, machine, env)
     if values is None:
         return None
-    low, high, *_ = evaluated(plan.frames[0], machine.tracking(), env)
+    low, high, *_ = numbers_at(plan.frames[0], machine.tracking(), env)
     found = known(plan, values, float(high.v - low.v), min(machine.rtol, LOOSEST))
     if found is None:
         return None
@@ -323,7 +323,7 @@ def _decided(
     if values is not None and plan.choices is not None:
         if len(children(plan.choices.body)) > MOST_CHOICES:
             return plan, None
-        met = [float(cell.v) for cell in evaluated(plan.choices, machine, env)]
+        met = [float(cell.v) for cell in numbers_at(plan.choices, machine, env)]
         if not all(x in (0.0, 1.0) for x in met):
             return plan, None
         plan = plan.decided(tuple(x == 1.0 for x in met))

@@ -17,11 +17,11 @@ from typing import Any
 import numpy as np
 from msgspec import Struct
 
-from potto.integrate.fixed.moving_sums import MovingTotals, evaluated, summed
+from potto.integrate.fixed.moving_sums import MovingTotals, summed
 from potto.integrate.fixed.proved_sums.alone import LEFT, RegionPart
 from potto.integrate.fixed.proved_sums.sum_text import RepeatedSum, SumText
 from potto.integrate.fixed.straight import StraightIntegral
-from potto.integrate.pieces import Evaluator
+from potto.integrate.pieces import Evaluator, numbers_at
 from potto.integrate.rules.gauss import EPS
 from potto.integrate.rules.proved_orders import Region
 from potto.kernels.making import counts
@@ -85,7 +85,7 @@ class SettledRegion(Struct, eq=False):
             return self.straight(env)  # type: ignore[no-any-return]
         plan, machine, start = self.plan, self.machine, time.thread_time()
         with np.errstate(all="ignore"):
-            frame = evaluated(plan.frames[0], machine, env)
+            frame = numbers_at(plan.frames[0], machine, env)
             found = summed(plan.variables, plan.frames, self.region, machine, env, frame)
         self.sums.spent += time.thread_time() - start
         return None if found is None else accurate(found, self.truncation, machine.rtol, machine.atol)

@@ -16,11 +16,11 @@ import numpy as np
 from msgspec import Struct
 
 from potto.core.terms import Const, children
-from potto.integrate.fixed.moving_sums import any_moves, evaluated
+from potto.integrate.fixed.moving_sums import any_moves
 from potto.integrate.fixed.steps.step_integral import StepIntegral
 from potto.integrate.fixed.steps.step_sides import Passed, Sides, layout, same_leads, sides_of, taken
 from potto.integrate.fixed.straight import CLEAR
-from potto.integrate.pieces import Evaluator
+from potto.integrate.pieces import Evaluator, numbers_at
 from potto.integrate.rules.gauss import EPS
 from potto.kernels.cells import Array, Bools, Cell, Ints, Value
 
@@ -90,7 +90,7 @@ class StepCells(Struct, frozen=True):
 
 def step_cells(plan: StepIntegral, machine: Evaluator, env: dict[str, Value], batch: int | None = None) -> StepCells:
     """The cells of one member, or of a batch. machine: one that keeps track of rounding."""
-    frame = evaluated(plan.frame, machine, {name: env[name] for name in plan.frame.params})
+    frame = numbers_at(plan.frame, machine, env)
     levels = levels_of(plan, machine, env)
     return cells_between(plan, frame, levels, machine, env, machine.directions, () if batch is None else (batch,))
 
@@ -157,7 +157,7 @@ def levels_of(plan: StepIntegral, machine: Evaluator, env: Mapping[str, Value]) 
     """What each step function is added up from, where that is not all numbers."""
     if all(plan.resting):
         return [()] * len(plan.steps)
-    levels = evaluated(plan.heights, machine, {name: env[name] for name in plan.heights.params})
+    levels = numbers_at(plan.heights, machine, env)
     ends = _ends(plan)
     return [levels[start:stop] for start, stop in itertools.pairwise(ends)]
 

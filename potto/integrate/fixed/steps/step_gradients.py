@@ -14,13 +14,13 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from potto.integrate.fixed.moving_sums import SUMMED, MovingTotals, evaluated, product
+from potto.integrate.fixed.moving_sums import SUMMED, MovingTotals, product
 from potto.integrate.fixed.steps.step_cells import WIDE, WIDE_EPS, StepCells, cells_between, levels_of
 from potto.integrate.fixed.steps.step_integral import StepIntegral
 from potto.integrate.fixed.steps.step_orders import StepProof, others, proved
 from potto.integrate.fixed.steps.step_sides import layout
 from potto.integrate.fixed.steps.step_sums import lit
-from potto.integrate.pieces import Evaluator, dense
+from potto.integrate.pieces import Evaluator, dense, numbers_at
 from potto.integrate.rules.gauss import EPS, gauss
 from potto.kernels.cells import Array, Cell, Value
 from potto.kernels.sweeps import Accumulated, adjoints
@@ -41,7 +41,7 @@ def step_gradient(
     for `step_sum`. machine: one that keeps track of rounding."""
     seeds = {name: Node((), ()) for name in moving}
     taped = {name: Cell(cell.v, cell.e, (seeds.get(name),)) for name, cell in env.items()}  # type: ignore[arg-type]
-    frame = evaluated(plan.frame, machine.taped(), {name: taped[name] for name in plan.frame.params})
+    frame = numbers_at(plan.frame, machine.taped(), taped)
     levels = levels_of(plan, machine.taped(), taped)
     still: dict[str, Value] = {name: Cell(cell.v, cell.e) for name, cell in env.items()}
     cells = cells_between(plan, frame, levels, machine, still, 0)
@@ -93,7 +93,7 @@ def _on_cells(
         assert isinstance(cell, Cell)
         here[name] = Cell(cell.v, cell.e, (None,) * i + (1.0,) + (None,) * (k - i - 1))
     moved = machine.with_directions(k)
-    value, error = dense(moved.evaluate(plan.body, {n: here[n] for n in plan.body.params}, None), k, place.v.shape)  # type: ignore[union-attr]
+    value, error = dense(moved.evaluate(plan.body, here, None), k, place.v.shape)  # type: ignore[union-attr]
     number, size = rule.weights @ value[0], rule.weights @ np.abs(value[0])
     rounded = np.zeros(size.shape) if error is None else rule.weights @ error[0]
     long, off = np.zeros((2, *number.shape))

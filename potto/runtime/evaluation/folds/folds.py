@@ -72,7 +72,7 @@ def _read(machine: Machine, term: Fold, places: range, start: Value, env: Env) -
     try:
         with looked_through():
             for access in accesses:
-                value = machine.evaluate(function_of(access.term), {n: here[n] for n in access.term.free}, None)
+                value = machine.evaluate(function_of(access.term), here, None)
                 if not isinstance(value, Cell):
                     return term.body, {}, {}
                 (read if term.variable in access.term.free else known)[access.name] = value

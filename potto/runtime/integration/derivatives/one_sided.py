@@ -308,9 +308,7 @@ def _step(problem: Problem, plan: Plan, d: int, where: Spot | None) -> float | N
     outer = () if where is None else where.outer
     fits, moves = np.ones(STEPS.size, dtype=bool), np.zeros(STEPS.size, dtype=bool)
     for number, level in enumerate(plan.levels[: None if where is None else 1 + where.number]):
-        values = quiet.evaluate(level.frame, {n: here[n] for n in level.frame.params}, None)
-        assert isinstance(values, tuple)
-        lo, hi, rows = frame_rows(level, values)
+        lo, hi, rows = frame_rows(level, quiet, here)
         rows += searched_rows(replace(level, searched=()), here, lo, hi, size, quiet)
         low, high = (np.broadcast_to(np.nan_to_num(end.v, posinf=1e300, neginf=-1e300), (size,)) for end in (lo, hi))
         here[level.variable] = Cell(np.full(size, outer[number]) if number < len(outer) else 0.5 * low + 0.5 * high)

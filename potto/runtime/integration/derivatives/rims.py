@@ -57,5 +57,5 @@ def note_rims(machine: Machine, term: Integral, env: dict[str, Value]) -> None:
 
 def _number(machine: Machine, term: Term, env: dict[str, Value]) -> float | Array:
     """What a term is; nan for a tuple or a batch."""
-    value = machine.with_directions(0).evaluate(function_of(term), {n: env[n] for n in term.free}, None)
+    value = machine.with_directions(0).evaluate(function_of(term), env, None)
     return value.v if isinstance(value, Cell) and np.ndim(value.v) == 0 else np.nan

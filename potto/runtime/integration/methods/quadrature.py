@@ -151,9 +151,8 @@ def stretches(plan: Plan, machine: Machine, env: dict[str, Value], batch: int) -
 
     level = plan.levels[0]
     resting = {name: still(env[name]) for name in level.frame.params}
-    values = machine.looking_aside().tracking().evaluate(level.frame, resting, None)
-    assert isinstance(values, tuple)
-    return segments(level, *frame_rows(level, values), batch, 0, None).segments.a.size
+    rows = frame_rows(level, machine.looking_aside().tracking(), resting)
+    return segments(level, *rows, batch, 0, None).segments.a.size
 
 
 def best_order(plan: Plan, machine: Machine, env: dict[str, Value], batch: int) -> int:

@@ -140,7 +140,7 @@ def found_beside(machine: Machine, term: Term, accesses: tuple[Access, ...], env
     parts: dict[str, Term] = {}
     known = dict(env)
     for name, found in _in_turn(accesses):
-        known[name] = machine.evaluate(function_of(found), {own: known[own] for own in found.free}, None)
+        known[name] = machine.evaluate(function_of(found), known, None)
     for access in accesses:
         value = known[access.name]
         if isinstance(value, tuple):
