@@ -52,7 +52,7 @@ def _rounded(value: Any, exact: Any) -> Any:
 
 
 def _all_whole(*numbers: Any) -> Any:
-    found: Any = True
+    found = True
     for x in numbers:
         found = found & (x.is_integer() if isinstance(x, float) else np.rint(x) == x)
     return found
@@ -76,8 +76,8 @@ def add(value: Any, *args: Any) -> Any:
     batch = array and value.size > _looking.most
     if batch and len(args) == 2:
         return UNIT_ROUNDOFF * abs(value)
-    off: Any = UNIT_ROUNDOFF * abs(value) if batch else 0.0
-    total: Any = args[0]
+    off = UNIT_ROUNDOFF * abs(value) if batch else 0.0
+    total = args[0]
     for number, arg in enumerate(args[1:], 2):
         if number == len(args) and batch:
             break
@@ -138,7 +138,7 @@ def slopes(tangent: Any, *factors: Any) -> Any:
 
 def _sizes(factors: Sequence[Any]) -> Any:
     """The sum of the sizes of products, of slopes and tangents one after the other; the slopes of sums are 1."""
-    total: Any = None
+    total = None
     for at in range(0, len(factors), 2):
         a, b = factors[at], factors[at + 1]
         size = abs(b if a.__class__ is float and (a == 1.0 or a == -1.0) else a * b)

@@ -57,8 +57,8 @@ def given_up(work: PanelBatch, p: Pieces, found: Totals, sums: Sums) -> Sums:
     blamed = (~(errors <= BLAMED * size[:, owner]) & hopeless[:, owner]).any(axis=0)
     sharp = _sharp(work.seg)
     blamed &= ~_noise(work, p, errors, blamed) & sharp[p.segment]
-    grows: Any = np.zeros((work.width, work.batch, 2), dtype=bool)  # to inf, to -inf
-    lost: Any = np.zeros((work.width, work.batch), dtype=bool)
+    grows = np.zeros((work.width, work.batch, 2), dtype=bool)  # to inf, to -inf
+    lost = np.zeros((work.width, work.batch), dtype=bool)
     low, high = p.u0 < AT, p.u1 > 1 - AT
     inside = blamed & (p.u1 - p.u0 < SMALLEST) & ~low & ~high
     if not inside.any() and not (blamed & (low | high)).any():
@@ -97,7 +97,7 @@ def endless(work: PanelBatch, found: Totals) -> Array | None:
     index = np.nonzero(rough.any(axis=(0, 1))[work.seg.owner] & np.isfinite(work.seg.a + work.seg.b))[0]
     if not index.size:
         return None
-    goes: Any = np.zeros((2, work.k, work.batch), dtype=bool)  # up, down
+    goes = np.zeros((2, work.k, work.batch), dtype=bool)  # up, down
     for upper in (False, True):
         for d, sign in enumerate(_without_end(work, index, upper)):
             goes[0, d, work.seg.owner[index[sign > 0]]] = True

@@ -25,7 +25,7 @@ from potto.integrate.events import Unsearched
 from potto.integrate.levels import Corners, LevelPlan
 from potto.integrate.pieces import Evaluator, gather, numbers_at
 from potto.integrate.rules.gauss import EPS
-from potto.kernels.cells import Array, Cell, Ints, Value
+from potto.kernels.cells import Array, Cell, Ints, Number, Value
 
 ROUNDED = 2 * EPS  # of the sizes of its summands: how far off a sum of products is
 FINEST = 4 * EPS**2  # the same with what rounding took from each product
@@ -231,8 +231,8 @@ def within_walls(
     face: the surface, if any, that is not a wall, since it is what is integrated over.
     """
     slopes = numbers_at(level.slopes, machine.with_directions(0), env)
-    least: Any = -np.inf
-    most: Any = np.inf
+    least: Number = -np.inf
+    most: Number = np.inf
     for wall, slope in zip(level.walls, slopes, strict=True):
         if level.level.cuts[rows[wall[0]].cut].surface is face:
             continue

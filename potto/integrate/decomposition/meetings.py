@@ -198,7 +198,7 @@ def folds_at(
         if row.cut < 0:
             continue
         cut, x = plan.level.cuts[row.cut], as_array(row.x, batch)
-        merged: Any = np.zeros(batch, dtype=bool)
+        merged = np.zeros(batch, dtype=bool)
         for other in others[:-1]:
             merged = merged | (x == other)
         plain = not (cut.decides or row.turning or cut.turning)

@@ -150,7 +150,7 @@ class _Along(Struct, frozen=True, dict=True):
             return []
         tracked = self.machine.tracking().with_directions(0)
         at = number_at(self.function, tracked, {**self.still, self.variable: Cell(x)})
-        on: Any = empty & (np.abs(at.v) <= (0.0 if at.e is None else at.e))
+        on = empty & (np.abs(at.v) <= (0.0 if at.e is None else at.e))
         return [self.moving(np.where(on, x, np.nan), np.zeros(x.size))] if on.any() else []
 
     def on_a_grid(self, low: Array, high: Array) -> tuple[Ints, Array, Array]:

@@ -139,11 +139,11 @@ def interval_of(entry: Primitive) -> Callable[..., tuple[Any, ...]] | None:
 
 def _by_entry(entry: Primitive, bounds: Callable[..., tuple[Any, ...]], args: tuple[Interval, ...]) -> Interval:
     result = bounds(OPS, *args)
-    room: Any = ROUNDING
+    room = ROUNDING
     if entry.ulp != 1:
         lower, upper = (entry.places(*ends) for ends in zip(*args, strict=True))
         room = np.minimum(ROUNDING + EPS * np.maximum(lower, upper), 1.0)
-    off: Any = entry.off
+    off = entry.off
     if callable(off):
         off = np.fmax(np.fmax(*(off(*ends) for ends in zip(*args, strict=True))), 0.0)  # nan at infinity
     lo, hi = _defined(args, result, room, off)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -42,7 +41,7 @@ def _wrong(path: Path, mistake: DataMistake) -> PottoError:
 
 
 def _rows(array: NumberArray) -> Value:
-    numbers: Any = np.asarray(array.values)
+    numbers = np.asarray(array.values)
     item: Value = Cell(np.ascontiguousarray(numbers))
     if isinstance(array.item, NumberRow):
         item = tuple(Cell(np.ascontiguousarray(numbers[..., place])) for place in range(array.item.length))

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from typing import Any
 
 import numpy as np
 from msgspec.structs import replace
@@ -226,7 +225,7 @@ def given_up(machine: Machine, shape: tuple[int, ...]) -> Value:
 
 def poisoned(sums: Sums, env: dict[str, Value]) -> Sums:
     """A parameter that is not a number makes the integral not a number, whatever the cuts made of it."""
-    bad: Any = False
+    bad = False
     for value in env.values():
         for cell in (value,) if isinstance(value, Cell) else value if isinstance(value, tuple) else ():
             if isinstance(cell, Cell) and np.isnan(np.sum(cell.v)):  # in a third of the time of a look at each

@@ -68,7 +68,7 @@ def as_a_whole(machine: Machine, term: Term, given: Value, run: Run, part: bool 
         return value
     value, batch = pad(value, machine.directions), _batch(given)
     members = _few(record.sided(*before), batch)
-    there: Any = (...,) if members is None else (..., members)
+    there = (...,) if members is None else (..., members)
     v, e, slopes, off = _numbers(value, machine.directions, batch)
     here = v[there], e[there], slopes[there], off[there]
     jumps = any(edge.cause.jump or edge.endless for edge in met)

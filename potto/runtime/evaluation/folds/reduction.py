@@ -172,7 +172,7 @@ def _made(machine: Machine, op: str, numbers: Array, slopes: Array, start: Cell,
     whole = np.prod(numbers, axis=0) if op == "mul" else getattr(np, op)(numbers, axis=0)
     sizes, count = np.abs(slopes), len(numbers)
     e = _total(sizes, start.e, value.e, numbers)
-    relative: Any = 0.0
+    relative: Number = 0.0
     if op == "mul":
         integral = np.all(np.rint(numbers) == numbers, axis=0)
         relative = np.where(integral & (sizes <= LARGEST), 0.0, 2 * count * UNIT_ROUNDOFF)

@@ -96,7 +96,7 @@ class _Stepped:
                 continue
             for number, sign in enumerate(self.signs(error, 0.0 if size is None else size)):
                 at = self.k + group * SAMPLES + number
-                own: Any = t[at]
+                own = t[at]
                 t[at] = sign * error if own is None else own + sign * error
         et = (None,) * self.k if self.sampled else off.et[: self.k]
         return Cell(cell.v, None, tuple(t), (*et, *self.still()))

@@ -67,7 +67,7 @@ def spread(matrices: Array, local: Array, first: Array) -> Array:
     more = _blocks(local, np.zeros(d))
     maps: list[Array] = [np.broadcast_to(np.eye(d), blocks[:, 0].shape)]
     within: list[Array] = [np.zeros_like(more[:, 0])]
-    errors: Any = None  # columns, each one error of before in this block
+    errors = None  # columns, each one error of before in this block
     for place in range(blocks.shape[1]):
         step = blocks[:, place]
         maps.append(step @ maps[-1])
