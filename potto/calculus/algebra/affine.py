@@ -7,14 +7,13 @@ vanishes for particular parameters is a question of run time; here it is a term.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from fractions import Fraction
 
 from msgspec import Struct
 
-from potto.calculus.algebra.polynomial_in import collect
+from potto.calculus.algebra.polynomial_in import in_powers
 from potto.calculus.algebra.radicals import quotient
 from potto.calculus.algebra.rational_form import is_zero, shorter
-from potto.core.terms import ONE, ZERO, Term, add, mul, neg, sub, var
+from potto.core.terms import ONE, ZERO, Term, add, mul, neg, sub
 
 Matrix = tuple[tuple[Term, ...], ...]
 
@@ -34,17 +33,13 @@ def affine(term: Term, variables: Sequence[str]) -> Affine | None:
     coefficients: list[Term] = []
     rest = term
     for name in variables:
-        found = collect(rest, name)
-        if found is None or not found.atoms <= {var(name)}:
+        found = in_powers(rest, name, 1)
+        if found is None:
             return None
-        degrees = found.degrees(var(name))
-        if not set(degrees) <= {Fraction(0), Fraction(1)}:
-            return None
-        coefficient = shorter(degrees.get(Fraction(1), ZERO))
+        coefficient, rest = shorter(found[0]), found[1]
         if coefficient.free & names:
             return None
         coefficients.append(ZERO if is_zero(coefficient) else coefficient)
-        rest = degrees.get(Fraction(0), ZERO)
     return Affine(tuple(coefficients), rest)
 
 

@@ -1,8 +1,8 @@
 """A term as a polynomial in what contains one variable.
 
-Owns `collect`: a term as a sum of coefficient * atom^degree * ..., where atoms contain the variable (the variable
-itself, exp(x), sin(x), ...) and coefficients do not. Degrees are fractions: sqrt(x) is x^(1/2), exp(-2*x) is
-exp(x)^(-2). Coefficients stay terms, so that nothing is rounded here.
+Owns `collect` and `in_powers`: a term as a sum of coefficient * atom^degree * ..., where atoms contain the variable
+(the variable itself, exp(x), sin(x), ...) and coefficients do not. Degrees are fractions: sqrt(x) is x^(1/2), exp(-2*x)
+is exp(x)^(-2). Coefficients stay terms, so that nothing is rounded here.
 """
 
 from __future__ import annotations
@@ -13,7 +13,8 @@ from functools import lru_cache
 
 from msgspec import Struct
 
-from potto.core.terms import ONE, Const, Prim, Term, Var, add, const, div, mul, neg, postorder, pow_, prim
+from potto.core.collecting import sum_of
+from potto.core.terms import ONE, ZERO, Const, Prim, Term, Var, add, const, div, mul, neg, postorder, pow_, prim, var
 
 Monomial = tuple[tuple[Term, Fraction], ...]
 Parts = dict[Monomial, list[Term]]
@@ -49,21 +50,21 @@ def collect(term: Term, name: str) -> Collected | None:
             return None
         memo[node] = parts
     result = {m: add(*(c for c in cs)) for m, cs in memo[term].items()}
-    return Collected({m: c for m, c in result.items() if not _is_zero(c)})
+    return Collected({m: c for m, c in result.items() if not _cancels(c)})
 
 
-def _is_zero(term: Term) -> bool:
-    if isinstance(term, Const):
-        return term.value == 0
-    if isinstance(term, Prim) and term.op == "add":
-        left: list[Term] = []
-        for item in term.args:
-            if neg(item) in left:
-                left.remove(neg(item))
-            else:
-                left.append(item)
-        return not left
-    return False
+def _cancels(term: Term) -> bool:
+    return (sum_of(term) if isinstance(term, Prim) and term.op == "add" else term) is ZERO
+
+
+def in_powers(term: Term, name: str, highest: int) -> tuple[Term, ...] | None:
+    """The coefficients of a polynomial of at most this degree in a variable, that of the highest power first; None if a
+    term is none."""
+    found = collect(term, name)
+    if found is None or not found.atoms <= {var(name)}:
+        return None
+    degrees, powers = found.degrees(var(name)), [Fraction(n) for n in range(highest, -1, -1)]
+    return tuple(degrees.get(n, ZERO) for n in powers) if degrees.keys() <= set(powers) else None
 
 
 def _expand(node: Term, memo: dict[Term, Parts], name: str) -> Parts | None:
@@ -141,6 +142,10 @@ def _join(first: Monomial, second: Monomial) -> Monomial:
     degrees = dict(first)
     for atom, degree in second:
         degrees[atom] = degrees.get(atom, Fraction(0)) + degree
+    return _in_order(degrees)
+
+
+def _in_order(degrees: dict[Term, Fraction]) -> Monomial:
     return tuple(sorted(((a, d) for a, d in degrees.items() if d), key=lambda pair: pair[0].digest))
 
 
@@ -175,8 +180,7 @@ def _exponential(item: Parts) -> Parts:
         inner = mul(rest, *(pow_(a, const(float(d))) if d != 1 else a for a, d in monomial))
         atom = prim("exp", inner)
         degrees[atom] = degrees.get(atom, Fraction(0)) + scale
-    key: Monomial = tuple(sorted(((a, d) for a, d in degrees.items() if d), key=lambda pair: pair[0].digest))
-    return {key: [mul(*factors)]}
+    return {_in_order(degrees): [mul(*factors)]}
 
 
 def _rational(part: Term) -> tuple[Fraction, Term]:

@@ -170,10 +170,10 @@ def is_zero(term: Term) -> bool:
         return not found.top  # a polynomial in variables only is 0 only if all of its coefficients are
     if differs is None:
         return False
-    from potto.core.reference import vanishes  # slow to import, and seldom needed
+    from potto.core.reference import zero_at_all  # slow to import, and seldom needed
 
     reduced = None if found is None else as_term(found.top)
-    return vanishes(term if reduced is None else reduced)  # what is left of a sum tells more than all that cancels
+    return zero_at_all(term if reduced is None else reduced)  # what is left of a sum tells more than all that cancels
 
 
 def equal(first: Term, second: Term) -> bool:

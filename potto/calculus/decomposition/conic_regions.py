@@ -8,10 +8,9 @@ find them (`integrate/decomposition/corners`).
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from fractions import Fraction
 
 from potto.calculus.algebra.affine import affine
-from potto.calculus.algebra.polynomial_in import collect
+from potto.calculus.algebra.polynomial_in import in_powers
 from potto.calculus.algebra.rational_form import is_zero, shorter
 from potto.calculus.decomposition.critical import Within
 from potto.calculus.decomposition.side_polynomials import Sides, settling
@@ -95,13 +94,8 @@ def polynomial(term: Term, name: str) -> tuple[Term, ...] | None:
 
 def _coefficients(term: Term, name: str) -> tuple[Term, ...] | None:
     """The coefficients of a polynomial of degree 2 at the most in a variable, of the square first."""
-    found = collect(term, name)
-    if found is None or not found.atoms <= {var(name)}:
-        return None
-    degrees = found.degrees(var(name))
-    if not set(degrees) <= set(map(Fraction, range(3))):
-        return None
-    return tuple(shorter(degrees.get(Fraction(n), ZERO)) for n in (2, 1, 0))
+    found = in_powers(term, name, 2)
+    return None if found is None else tuple(map(shorter, found))
 
 
 def _turned(cut: Cut, numbers: tuple[Term, ...]) -> tuple[Term, ...]:

@@ -9,13 +9,12 @@ given up with the reason. Nothing here looks at numbers.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from fractions import Fraction
 from functools import lru_cache
 
 from msgspec import Struct
 from msgspec.structs import replace
 
-from potto.calculus.algebra.polynomial_in import collect
+from potto.calculus.algebra.polynomial_in import in_powers
 from potto.calculus.algebra.radicals import NAN, guarded
 from potto.calculus.algebra.ranges import positive
 from potto.calculus.algebra.rational_form import settled, shorter
@@ -349,12 +348,7 @@ def _stops(term: Term, name: str) -> tuple[Term, ...] | None:
 
 def _vertex(term: Term, name: str, stops: list[Term]) -> tuple[Term, ...] | None:
     """The vertex of what is quadratic in the variable; nothing for what is affine in it."""
-    found = collect(term, name)
-    if found is None or found.atoms != {var(name)}:
-        return None
-    degrees = found.degrees(var(name))
-    if not set(degrees) <= {Fraction(0), Fraction(1), Fraction(2)}:
-        return None
-    if Fraction(2) not in degrees:
-        return tuple(stops)
-    return (*stops, neg(div(degrees.get(Fraction(1), ZERO), mul(const(2.0), degrees[Fraction(2)]))))
+    square, slope, _ = in_powers(term, name, 2) or (ZERO, ZERO, ZERO)
+    if square is ZERO:
+        return None if slope is ZERO else tuple(stops)
+    return (*stops, neg(div(slope, mul(const(2.0), square))))

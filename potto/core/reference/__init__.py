@@ -7,12 +7,12 @@ tests and checks import it; mpmath is an optional dependency.
 
 from potto.core.reference.functions import function
 from potto.core.reference.integrals import NotAccurate
-from potto.core.reference.sampling import vanishes
+from potto.core.reference.sampling import zero_at_all
 from potto.core.reference.walk import evaluate
 
 __all__ = [
     "NotAccurate",
     "evaluate",
     "function",
-    "vanishes",
+    "zero_at_all",
 ]

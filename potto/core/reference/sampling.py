@@ -1,7 +1,8 @@
 """Values of terms at sample points, to 50 digits.
 
-Owns `vanishes`, which tests on points whether a term is 0 everywhere. What is not a builtin and no choice (integrals,
-calls, ...) counts as an unknown with a value of its own, so that a term which vanishes for all its values is found.
+Owns `zero_at_all`, which tests on points whether a term is 0 everywhere. What is not a builtin and no choice
+(integrals, calls, ...) counts as an unknown with a value of its own, so that a term which vanishes for all its values
+is found.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ _SMALL = mp.mpf(10) ** -35  # relative to the largest part: cancellation at 50 d
 Number = tuple[Any, Any]  # a value, or a truth value, and the size of the largest part that went into it
 
 
-def vanishes(term: Term) -> bool:
+def zero_at_all(term: Term) -> bool:
     """Whether a term is 0 at every sample point at which it has a value; False if it has one at too few."""
     order = postorder(term)
     seen = 0

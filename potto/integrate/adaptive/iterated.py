@@ -22,7 +22,7 @@ from potto.integrate.decomposition.effective_range import Ranges, pulled_in, rea
 from potto.integrate.decomposition.meetings import Row, as_array
 from potto.integrate.decomposition.sections import searched_rows
 from potto.integrate.decomposition.shells import shells
-from potto.integrate.decomposition.vanishing import vanishes
+from potto.integrate.decomposition.vanishing import zero_on
 from potto.integrate.degenerate.coincidences import count_places, count_slivers, note_folds
 from potto.integrate.degenerate.degeneracies import beneath, brush
 from potto.integrate.degenerate.empty_ranges import Collapsed, collapsed_ranges, count_collapsed
@@ -300,12 +300,12 @@ class Iteration(Struct):
 
     def alive(self, sides: dict[int, Mask], seg: Segments, undefined: dict[int, Bools]) -> Ints | None:
         """The segments on which the integrand is not known to vanish; None for all of them."""
-        zero = vanishes(self.plan.vanishing, sides)
+        zero = zero_on(self.plan.vanishing, sides)
         if zero is False:
             return None
         mask = np.broadcast_to(np.asarray(zero), seg.a.shape)
         if undefined:  # there it vanishes only if it does on both sides
-            either = vanishes(self.plan.vanishing, {g: m for g, m in sides.items() if g not in undefined})
+            either = zero_on(self.plan.vanishing, {g: m for g, m in sides.items() if g not in undefined})
             mask = np.where(np.any(list(undefined.values()), axis=0), either, mask)
         return np.nonzero(~mask)[0] if mask.any() else None
 

@@ -9,7 +9,7 @@ down into the blocks where it may be something. So a primitive costs what it cov
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import lru_cache
+from functools import lru_cache, reduce
 from typing import Any
 
 import numpy as np
@@ -17,7 +17,8 @@ from msgspec import Struct
 
 from potto.calculus.solving.enclosable import enclosable
 from potto.core.terms import ZERO as NOTHING
-from potto.core.terms import Branch, If, Integral, Prim, Term, Tuple, postorder
+from potto.core.terms import Branch, Integral, Term, postorder
+from potto.integrate.decomposition.vanishing import zero_with
 from potto.integrate.rules.intervals import Interval
 from potto.integrate.rules.lowered_intervals import enclosures
 from potto.kernels.cells import Array, Bools, Ints
@@ -120,19 +121,7 @@ def culls(term: Integral) -> bool:
 
 def _below(node: Term) -> tuple[Term, ...]:
     """The parts of an integrand that make it 0 if they are."""
-    match node:
-        case Branch() | If():
-            return node.then, node.orelse
-        case Prim(op="add" | "mul" | "neg", args=args):
-            return args
-        case Prim(op="div", args=args):
-            return args[:1]
-        case Tuple(items=items):
-            return items
-        case Integral(body=body):
-            return (body,)
-        case _:
-            return ()
+    return (node.body,) if isinstance(node, Integral) else zero_with(node)[1]
 
 
 @lru_cache(maxsize=1024)
@@ -163,20 +152,11 @@ def _vanishing(term: Integral, box: dict[str, Interval], count: int, backend: st
 
 
 def _zero(node: Term, known: Mapping[Term, Any], sides: Mapping[Term, Interval]) -> Any:
-    match node:
-        case Branch():
-            then, orelse = known[node.then], known[node.orelse]
-            both = then & orelse
-            if node.surface not in sides:
-                return both
-            lo, hi = sides[node.surface]
-            return np.where(lo > 0, then, np.where(hi < 0, orelse, both))
-        case If():
-            return known[node.then] & known[node.orelse]
-        case Prim(op="mul", args=args):
-            return np.logical_or.reduce(np.broadcast_arrays(*(known[arg] for arg in args)))
-        case Prim(op="add" | "neg" | "div") | Tuple() | Integral():
-            parts = [known[part] for part in _below(node)]
-            return parts[0] if len(parts) == 1 else np.logical_and.reduce(np.broadcast_arrays(*parts))
-        case _:
-            return np.bool_(node is NOTHING)
+    if isinstance(node, Integral):
+        return known[node.body]
+    if isinstance(node, Branch) and node.surface in sides:
+        then, orelse = known[node.then], known[node.orelse]
+        lo, hi = sides[node.surface]
+        return np.where(lo > 0, then, np.where(hi < 0, orelse, then & orelse))
+    every, parts = zero_with(node)
+    return reduce(np.logical_and if every else np.logical_or, [known[part] for part in parts], np.bool_(every))

@@ -1,7 +1,7 @@
 """Where an integrand is exactly zero, told from the sides of its surfaces alone.
 
-Owns `Vanishing`, the test, `vanishing_of`, which makes it, `vanishes`, which asks it, and `held`, the sides that it
-asks for.
+Owns `Vanishing`, the test, `vanishing_of`, which makes it, `zero_on`, which asks it, and `held`, the sides that it asks
+for; and `zero_with`, of which parts that is made.
 """
 
 from __future__ import annotations
@@ -129,34 +129,39 @@ def _called(rows: _Rows, call: App, memo: dict[Term, int], site: int, numbers: N
 def _zero(
     rows: _Rows, node: Term, memo: dict[Term, int], index: Mapping[tuple[Term, int], int], numbers: Numbers
 ) -> int:
+    place = numbers.get((index.get((node, 2), -1),)) if isinstance(node, Branch) else None
+    if isinstance(node, Branch) and place is not None:
+        then, orelse = memo[node.then], memo[node.orelse]
+        return NEVER if then == orelse == NEVER else rows.number(Side(*place, then, orelse))
+    every, parts = zero_with(node)
+    return rows.joined(every, [memo[part] for part in parts])
+
+
+def zero_with(node: Term) -> tuple[bool, tuple[Term, ...]]:
+    """The parts with which a term is 0: whether every one of them has to be, and which they are. None have to be of
+    what is 0 itself; any of none is, of what is not known to be."""
     match node:
-        case Const():
-            return ALWAYS if node.value == 0 else NEVER
-        case Prim(op="mul"):
-            return rows.joined(False, [memo[a] for a in node.args])
-        case Prim(op="add"):
-            return rows.joined(True, [memo[a] for a in node.args])
-        case Prim(op="div"):
-            return memo[node.args[0]]
+        case Const(value=0.0):
+            return True, ()
+        case Prim(op="mul", args=args):
+            return False, args
+        case Prim(op="add", args=args):
+            return True, args
+        case Prim(op="div", args=(above, _)):
+            return True, (above,)
         case Prim(op=op, args=(inner,)) if EXACT.get((op, 0.0)) == 0:
-            return memo[inner]
-        case Branch():
-            place = numbers.get((index.get((node, 2), -1),))
-            then, orelse = memo[node.then], memo[node.orelse]
-            if place is None or then == orelse == NEVER:
-                return rows.joined(True, [then, orelse])
-            return rows.number(Side(*place, then, orelse))
-        case If():
-            return rows.joined(True, [memo[node.then], memo[node.orelse]])
+            return True, (inner,)
+        case Branch() | If():
+            return True, (node.then, node.orelse)
         case Tuple() | ListOf():
-            return rows.joined(True, [memo[a] for a in node.items])
+            return True, node.items
         case Proj():
-            return memo[node.term]
+            return True, (node.term,)
         case _:
-            return NEVER
+            return False, ()
 
 
-def vanishes(test: Vanishing, sides: Mapping[int, Mask]) -> Any:
+def zero_on(test: Vanishing, sides: Mapping[int, Mask]) -> Any:
     """Evaluate a vanishing test on sides: False, True or a mask."""
     found: list[Any] = [False, True]
     for row in test.rows:

@@ -13,7 +13,7 @@ import numpy as np
 
 from potto.core.terms import function_of
 from potto.integrate.columns import distinct
-from potto.integrate.decomposition.vanishing import vanishes
+from potto.integrate.decomposition.vanishing import zero_on
 from potto.integrate.degenerate.scene import IteratedVariable, placed, surfaces_at
 from potto.integrate.events import undefined
 from potto.integrate.levels import LevelPlan
@@ -103,7 +103,7 @@ def guarded_samples(
     for number, side, lost in fallen(plan, here, index.size, machine, free):
         below[number], above[number] = side, side | lost
         undefined.append((number, lost))
-    zero = np.broadcast_to(vanishes(plan.vanishing, below) & vanishes(plan.vanishing, above), index.shape)
+    zero = np.broadcast_to(zero_on(plan.vanishing, below) & zero_on(plan.vanishing, above), index.shape)
     for number, lost in undefined:
         if (lost & ~zero).any():
             _tell(plan, number, here, int(np.nonzero(lost & ~zero)[0][0]), machine)

@@ -18,11 +18,9 @@ from numpy.typing import NDArray
 
 from potto.core.terms import (
     Branch,
-    Const,
     Integral,
     Lam,
     Term,
-    Tuple,
     children,
     function_of,
     postorder,
@@ -183,11 +181,6 @@ def in_rows(between: Ints, variables: int) -> Ints:
 def row_shift(place: int, variables: int) -> int:
     """How many bits come behind the digit of such a number at this place, counted from the first one."""
     return ROW_BITS * (2 * variables - 1 - place)
-
-
-def nothing(face: Term) -> bool:
-    """Whether an integrand is 0."""
-    return all(map(nothing, children(face))) if isinstance(face, Tuple) else isinstance(face, Const) and face.value == 0
 
 
 def _distinct(frame: Lam) -> tuple[dict[int, int], Lam]:

@@ -13,6 +13,7 @@ from contextlib import AbstractContextManager, nullcontext
 
 import numpy as np
 
+from potto.calculus.differentiation.loops import vanishes
 from potto.core.terms import Term, function_of, tuple_
 from potto.integrate.columns import distinct
 from potto.integrate.fixed.boxes.sides import UNCLEAR, Box, Sides, sides_of
@@ -20,7 +21,6 @@ from potto.integrate.fixed.boxes.tensor_product import ORDERS, BoxIntegrand, int
 from potto.integrate.fixed.lowered.box_text import DONE, Look
 from potto.integrate.fixed.lowered.boxes import LoweredBoxes, Passed
 from potto.integrate.fixed.lowered.cells import places_of
-from potto.integrate.fixed.straight import nothing
 from potto.integrate.pieces import Evaluator, Sums, gather
 from potto.kernels.cells import Array, Cell, Ints, Value
 
@@ -55,7 +55,7 @@ def _by_faces(
         if code == UNCLEAR:
             continue
         face, there = box.face(code), sides.codes == code
-        if nothing(face.term):
+        if vanishes(face.term):
             done |= there
             continue
         index = np.flatnonzero(there)
@@ -97,7 +97,7 @@ def _deciding(box: Box, machine: Evaluator, env: dict[str, Value]) -> tuple[Lowe
     faces: dict[Term, list[int]] = {}
     for code in range(1 << len(box.places)):
         term = box.face(code).term
-        if not nothing(term):
+        if not vanishes(term):
             faces.setdefault(term, []).append(code)
     if len(faces) > MOST_FACES:
         return ()

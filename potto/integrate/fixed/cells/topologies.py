@@ -14,11 +14,12 @@ from collections.abc import Collection
 import numpy as np
 from msgspec import Struct
 
+from potto.calculus.differentiation.loops import vanishes
 from potto.core.terms import Term, children
 from potto.integrate.columns import distinct
 from potto.integrate.fixed.lowered.topologies import Found, lowered_topologies
 from potto.integrate.fixed.lowered.topology_text import FARTHEST
-from potto.integrate.fixed.straight import CLEAR, ROW_BITS, StraightIntegral, nothing, rows_between
+from potto.integrate.fixed.straight import CLEAR, ROW_BITS, StraightIntegral, rows_between
 from potto.integrate.pieces import Evaluator, gather, numbers_at
 from potto.kernels.cells import Array, Bools, Cell, Ints, Number, Value
 
@@ -157,7 +158,7 @@ def _gathered(plan: StraightIntegral, machine: Evaluator, cells: Found) -> list[
         own = None  # all of them, as mostly
         if len(codes) > 1:
             own = np.any([sides == code for code in those], axis=0) if len(those) < FEW else np.isin(sides, those)
-        dark, lit = nothing(face), sides.size if own is None else int(own.sum())
+        dark, lit = vanishes(face), sides.size if own is None else int(own.sum())
         if machine.costs is not None:
             machine.costs.stretches(lit, 0 if dark else lit)
         for turn in () if dark else distinct(turns if own is None else turns[own]):

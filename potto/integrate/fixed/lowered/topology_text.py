@@ -13,9 +13,10 @@ from collections.abc import Sequence
 import numpy as np
 from msgspec import Struct
 
+from potto.calculus.differentiation.loops import vanishes
 from potto.core.terms import children, postorder
 from potto.integrate.fixed.lowered.formula_text import Env, FormulaText, ParameterPlace, Symbol
-from potto.integrate.fixed.straight import CLEAR, ROW_BITS, StraightIntegral, nothing
+from potto.integrate.fixed.straight import CLEAR, ROW_BITS, StraightIntegral
 from potto.integrate.pieces import Evaluator
 from potto.kernels.native.elementary import module
 from potto.kernels.native.operations import NotStraight
@@ -40,7 +41,7 @@ def lit_sides(plan: StraightIntegral) -> int | None:
     if count > TOLD or len(postorder(plan.body)) << count > LOOKED_AT:
         return None
     faces = (plan.face(tuple(bool(code >> bit & 1) for bit in range(count))) for code in range(1 << count))
-    return sum(1 << code for code, face in enumerate(faces) if not nothing(face))
+    return sum(1 << code for code, face in enumerate(faces) if not vanishes(face))
 
 
 class Ordered(Struct, frozen=True):

@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from potto.calculus.differentiation.loops import vanishes
 from potto.core.terms import children
 from potto.integrate.fixed.moving_sums import MovingTotals, summed
 from potto.integrate.fixed.proved_sums.alone import machine_code, promotion, summed_alone
@@ -28,7 +29,7 @@ from potto.integrate.fixed.regions import LOOSEST, Path, Places, known, region_o
 from potto.integrate.fixed.steps.step_cells import step_cells
 from potto.integrate.fixed.steps.step_gradients import step_gradient
 from potto.integrate.fixed.steps.step_sums import SteppedCall
-from potto.integrate.fixed.straight import CLEAR, MOST_CHOICES, StraightIntegral, nothing
+from potto.integrate.fixed.straight import CLEAR, MOST_CHOICES, StraightIntegral
 from potto.integrate.pieces import Evaluator, Sums, numbers_at
 from potto.integrate.rules.proved_orders import FrameCell as Stretch
 from potto.integrate.rules.proved_orders import Region
@@ -69,7 +70,7 @@ def _cells(
         nonlocal shortest
         if i == len(plan.variables):
             face = plan.face(_sides(plan, tracked, here))
-            dark = nothing(face)
+            dark = vanishes(face)
             if machine.costs is not None:
                 machine.costs.stretches(1, 0 if dark else 1)
             if not dark:
