@@ -89,7 +89,7 @@ class Outlines:
 
 def outlined(
     term: Integral, found: Sequence[Finding], hides: bool, resolve: Resolve, over: LevelSet | None,
-    findings: Callable[[Term], Iterable[Finding]], mixed: Iterable[Term] = (),
+    findings: Callable[[Term], Iterable[Finding]], mixed: Iterable[Term],
 ) -> Outline:  # fmt: skip
     """The outline of an integral whose integrand has these surfaces; `findings` gives those of a bound. mixed: surfaces
     with conditions inside, as they were written: these may be decided in what is integrated."""

@@ -11,11 +11,12 @@ import numpy as np
 import pytest
 
 import potto
+from potto.calculus.differentiation.loops import vanishes
 from potto.core.terms import children
 from potto.integrate.fixed.cells import topologies as module
 from potto.integrate.fixed.cells.topologies import in_order
 from potto.integrate.fixed.lowered.topologies import Found, LoweredTopologies
-from potto.integrate.fixed.straight import StraightIntegral, nothing
+from potto.integrate.fixed.straight import StraightIntegral
 from potto.kernels.cells import Cell
 
 pytest.importorskip("llvmlite")
@@ -71,7 +72,7 @@ def _lit(plan: StraightIntegral, found: Found) -> list[tuple[int, ...]]:
     columns = (found.members, found.between, found.sides)
     cells = sorted(zip(*(column.tolist() for column in columns), strict=True))
     count = len(children(plan.surfaces.body))
-    return [cell for cell in cells if not nothing(plan.face(tuple(bool(cell[-1] >> bit & 1) for bit in range(count))))]
+    return [cell for cell in cells if not vanishes(plan.face(tuple(bool(cell[-1] >> bit & 1) for bit in range(count))))]
 
 
 def test_what_may_be_anywhere_has_no_order() -> None:

@@ -73,9 +73,7 @@ Rate = Callable[[Term], Term]
 Name = Callable[[Term, SurfaceRoot], NamedRoot | None]  # of a root of a surface, if it has one
 
 
-def at_surfaces(
-    node: Integral, moving: frozenset[str], rate: Rate, wanted: Roots = Roots.STEADY, name: Name | None = None
-) -> list[Term]:
+def at_surfaces(node: Integral, moving: frozenset[str], rate: Rate, wanted: Roots, name: Name | None) -> list[Term]:
     """The boundary terms of an integral, one for each root of each surface that moves; over a level set, as an integral
     of a delta, where roots have no closed form that is `wanted`. name: what roots are called where not by their place.
     """

@@ -8,7 +8,7 @@ evaluated and differentiated again: an independent check of the numeric derivati
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 
 from potto.calculus.decomposition.joined import joined
 from potto.calculus.decomposition.normal_combinations import combined
@@ -101,10 +101,6 @@ def dual_function(function: Lam, resolve: Resolve = nothing_known, frozen: bool 
     return Differentiator(resolve, frozen=frozen).function(function)
 
 
-def split_pairs(value: Term, tangent: Term) -> Term:
-    return tuple_((value, tangent))
-
-
 class Differentiator:
     """One derivation. singular: a jump becomes a delta, for an integral is around it; frozen: it stands still.
 
@@ -112,20 +108,19 @@ class Differentiator:
     """
 
     def __init__(
-        self, resolve: Resolve, singular: bool = False, pairs: Callable[[Term, Term], Term] | None = None,
-        frozen: bool = False, wanted: Roots = Roots.STEADY, names: RootNames | None = None,
+        self, resolve: Resolve, singular: bool = False, frozen: bool = False, wanted: Roots = Roots.STEADY,
+        names: RootNames | None = None,
     ) -> None:  # fmt: skip
         self.resolve = resolve
         self.singular = singular
         self.frozen = frozen
         self.wanted = wanted
         self.names = names
-        self.pair = pairs or split_pairs
 
     def dual(self, term: Term, tangents: Mapping[str, Term]) -> Dual:
         functions = {n: t for n, t in tangents.items() if n in heads_of(term)}
         value, tangent = _Pass(self, tangents).run(term)
-        return as_values(value, functions, self.pair), as_values(tangent, functions, self.pair)
+        return as_values(value, functions), as_values(tangent, functions)
 
     def function(self, function: Lam) -> Lam:
         """Over duals, group by group."""
@@ -262,8 +257,7 @@ class _Pass:
         """An argument as its dual function takes it."""
         if self.is_function(arg):
             return self.function(arg)
-        value, tangent = self.found[arg]
-        return self.owner.pair(value, tangent)
+        return tuple_(self.found[arg])
 
     def is_function(self, term: Term) -> bool:
         match term:
@@ -309,7 +303,7 @@ class _Pass:
         values: dict[str, Term] = {}
         functions: dict[str, Term] = {}
         params = tuple(self.parameter(p, p in heads, taken, values, tangents, functions) for p in function.params)
-        result = as_values(_Pass(self.owner, tangents).body_of(function), functions, self.owner.pair)
+        result = as_values(_Pass(self.owner, tangents).body_of(function), functions)
         opened = substitute(result, values)
         stand_ins = {next(iter(t.free)): outside[n] for n, t in tangents.items() if n in outside}
         made = lam(params, substitute(opened, stand_ins))
@@ -338,7 +332,7 @@ class _Pass:
         value, tangent = self.run(body)
         if self.owner.singular:
             tangent = self.owner.with_deltas(body, tangent, self.tangents)
-        return self.owner.pair(value, tangent)
+        return tuple_((value, tangent))
 
     # Binders
 

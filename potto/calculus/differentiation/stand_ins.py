@@ -5,19 +5,29 @@ Owns `as_values`.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 
 from potto.calculus.surfaces.trace import spine
-from potto.core.terms import ZERO, App, Deriv, Global, Lam, Term, Var, app, children, deriv, postorder, proj, rebuild
+from potto.core.terms import (
+    ZERO,
+    App,
+    Deriv,
+    Global,
+    Lam,
+    Term,
+    Var,
+    app,
+    children,
+    deriv,
+    postorder,
+    proj,
+    rebuild,
+    tuple_,
+)
 
-Pair = Callable[[Term, Term], Term]
 
-
-def as_values(term: Term, functions: Mapping[str, Term], pair: Pair) -> Term:
-    """The term, in which these functions are called, or handed on, by their duals.
-
-    pair: of a value and a tangent, as the duals take them.
-    """
+def as_values(term: Term, functions: Mapping[str, Term]) -> Term:
+    """The term, in which these functions are called, or handed on, by their duals."""
     if not functions or not term.free & functions.keys():
         return term
     inner = {n.function for n in postorder(term) if isinstance(n, App)}
@@ -26,7 +36,7 @@ def as_values(term: Term, functions: Mapping[str, Term], pair: Pair) -> Term:
     def over(arg: Term) -> Term:
         if isinstance(arg, Var) and arg.name in functions:
             return functions[arg.name]
-        return deriv(arg) if isinstance(arg, Global | Deriv | Lam) else pair(memo[arg], ZERO)
+        return deriv(arg) if isinstance(arg, Global | Deriv | Lam) else tuple_((memo[arg], ZERO))
 
     for node in postorder(term):
         if isinstance(node, App) and node not in inner:

@@ -123,7 +123,7 @@ def immediate(term: Term) -> tuple[Term, ...]:
             return children(term)
 
 
-def integrating(term: Prim, inexact: Callable[[Term], bool] | None = None) -> frozenset[Term]:
+def integrating(term: Prim, inexact: Callable[[Term], bool] | None) -> frozenset[Term]:
     """The summands, if they are several, that are made of integrals and arithmetic, so that none has a site; or of
     calls that lead to integrals, too, where nobody forces sites: there `inexact` says which do."""
     if term.op != "add":

@@ -19,6 +19,7 @@ from potto.core.terms import Delta, Integral, Term
 Value = Any  # an mpmath number, a tuple or list of values, a truth value, or a function of values
 Environment = Mapping[str, Value]
 
+_SAMPLES = 64  # points of an interval that are looked at in search of places where the integrand jumps or bends
 _MOST_SPLITS = 6  # halvings of a piece on which quadrature does not settle
 _MOST_TRIES = 4  # at finding a root faster than by halving
 _MOST_STEPS = 40  # towards the bottom of a dip
@@ -39,7 +40,6 @@ class Oracle(Protocol):
     """Who evaluates integrands and bounds, and writes the trace. `forced`: the delta that counts as 1."""
 
     digits: int
-    samples: int
     trace: Trace | None
     deciding: int
     deltas: int
@@ -111,7 +111,7 @@ class _Look:
 
     def cuts(self, lo: Any, hi: Any, hints: list[Any]) -> list[Any]:
         """Where the trace changes, and the hints inside."""
-        grid = _grid(lo, hi, self.oracle.samples, hints)
+        grid = _grid(lo, hi, _SAMPLES, hints)
         traces = [self.trace(x) for x in grid]
         found: set[Any] = set()
         for (a, at_a), (b, at_b) in zip(zip(grid, traces), zip(grid[1:], traces[1:])):

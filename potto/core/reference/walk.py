@@ -58,19 +58,17 @@ def evaluate(
     env: Mapping[str, Any] | None = None,
     lookup: Lookup | None = None,
     digits: int = 30,
-    samples: int = 64,
     data: Mapping[tuple[str, str], Any] | None = None,
 ) -> Value:
     """The value of a term, to about `digits` digits: an mpmath number, a tuple, a list or a function.
 
-    `env` gives its free variables, `lookup` other definitions by module and name. `samples` is how many points of an
-    interval are looked at in search of places where the integrand jumps or bends. `data`: what files hold, by path and
+    `env` gives its free variables, `lookup` other definitions by module and name. `data`: what files hold, by path and
     column.
     """
     with mp.workdps(digits + GUARD), _deep_recursion():
         values = {name: as_value(value) for name, value in (env or {}).items()}
         held = {place: as_value(value) for place, value in (data or {}).items()}
-        return Walk(lookup, digits, samples, held).run(term, values)
+        return Walk(lookup, digits, held).run(term, values)
 
 
 @contextlib.contextmanager
@@ -96,11 +94,10 @@ def as_value(value: Any) -> Value:
 class Walk:
     """One evaluation: how definitions are found, how exact it is, and the trace that is being written."""
 
-    def __init__(self, lookup: Lookup | None, digits: int, samples: int, data: Mapping[tuple[str, str], Value]) -> None:
+    def __init__(self, lookup: Lookup | None, digits: int, data: Mapping[tuple[str, str], Value]) -> None:
         self.lookup = lookup
         self.data = data
         self.digits = digits
-        self.samples = samples
         self.trace: Trace | None = None
         self.deciding = 0
         self.deltas = 0  # deltas met in this evaluation so far

@@ -38,7 +38,7 @@ def parameter_step(values: Iterable[Value], d: int) -> float | None:
 
 
 def approached(
-    at: Callable[[float], Parts], step: float, here: tuple[Array, Array], rtol: float | None = None
+    at: Callable[[float], Parts], step: float, here: tuple[Array, Array], rtol: float | None
 ) -> tuple[Array, Array]:
     """The derivatives on the side of the parameters on which a step is, and how far off they may be.
 
