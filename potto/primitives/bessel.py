@@ -10,11 +10,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any
 
 from potto.core.terms import ONE, ZERO, Term, add, const, div, if_, mul, neg, prim, sub
 from potto.primitives.bounds import exponential
-from potto.primitives.registry import EPS, Elementwise, Ends, Primitive, register
+from potto.primitives.registry import EPS, Elementwise, Ends, Primitive, Quantity, register
 
 TOPIC = "Bessel functions"
 TWO = const(2.0)
@@ -25,7 +24,7 @@ FAR, SPHERICAL, NEAR = 20.0, 6.0, 4.0
 
 
 def _tangent_bounds(
-    op: str, slope: Callable[..., Any], bend: float, fall: Callable[[Elementwise, Any], Any]
+    op: str, slope: Callable[..., Quantity], bend: float, fall: Callable[[Elementwise, Quantity], Quantity]
 ) -> Callable[..., Ends]:
     """By the tangent at the middle and a bound of the second derivative; no wider than what holds as far out."""
 
@@ -43,21 +42,21 @@ def _tangent_bounds(
     return run
 
 
-def _amplitude(x: Any) -> Any:
+def _amplitude(x: Quantity) -> Quantity:
     """What |J0| and |J1| are no larger than, to within 1.04."""
     return (2 / math.pi / (abs(x) + 2 / math.pi)) ** 0.5
 
 
-def _near(x: Any) -> Any:
+def _near(x: Quantity) -> Quantity:
     """|x| near 0, and 1 far from it."""
     return abs(x) / (1 + abs(x))
 
 
-def _entire_remainder(ops: Elementwise, n: Any, m: Any, d: Any) -> Any:
+def _entire_remainder(ops: Elementwise, n: Quantity, m: Quantity, d: Quantity) -> Quantity:
     return exponential(ops, d)
 
 
-def _root_fall(ops: Elementwise, x: Any) -> Any:
+def _root_fall(ops: Elementwise, x: Quantity) -> Quantity:
     """sqrt(2/(pi x)) bounds J0, and times 1.04 also J1 (its largest is 0.5819 at 1.84, where the bound is 0.61)."""
     return 1.04 * ops.of("sqrt")(ops.of("div")(2 / math.pi, ops.most(x, 1e-300)))
 
@@ -73,13 +72,14 @@ def _neighbours(n: Term, x: Term) -> Term:
     return if_(prim("eq", n, ZERO), neg(prim("sphericalj", ONE, x)), found)
 
 
-def _slope(ops: Elementwise, n: Any, x: Any) -> Any:
+def _slope(ops: Elementwise, n: Quantity, x: Quantity) -> Quantity:
     return 0.5 * (ops.of("besselj")(n - 1, x) - ops.of("besselj")(n + 1, x))
 
 
-def _spherical_slope(ops: Elementwise, n: Any, x: Any) -> Any:
+def _spherical_slope(ops: Elementwise, n: Quantity, x: Quantity) -> Quantity:
     f = ops.of("sphericalj")
-    return ops.where(n == 0, -f(1.0, x), (n * f(abs(n - 1), x) - (n + 1) * f(n + 1, x)) / (2 * n + 1))
+    found: Quantity = ops.where(n == 0, -f(1.0, x), (n * f(abs(n - 1), x) - (n + 1) * f(n + 1, x)) / (2 * n + 1))
+    return found
 
 
 besselj = register(

@@ -9,38 +9,39 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any
 
-from potto.primitives.registry import EPS, Elementwise, Ends
+from potto.primitives.registry import EPS, Elementwise, Ends, Quantity, Truth
 
 # How near to a singularity of a function a disc may come, as a part of its centre's distance from it.
 NEAREST = 0.95
 
-Remainder = Callable[[Elementwise, Any, Any], Any]
+Remainder = Callable[[Elementwise, Quantity, Quantity], Quantity]
 
 
-def slack(d: Any) -> Any:
+def slack(d: Quantity) -> Quantity:
     """More than the rounding of a difference of numbers of the size of d, where d is small: d^2 of the last places."""
     return 1e-15 * d + 1e-15 * d * d
 
 
-def share(ops: Elementwise, distance: Any, d: Any) -> Any:
+def share(ops: Elementwise, distance: Quantity, d: Quantity) -> Quantity:
     """How far a disc reaches, as a part of its centre's distance from a singularity; nan where it comes too near."""
     q = ops.of("div")(d, abs(distance))
-    return ops.where(q <= NEAREST, q, math.nan)
+    part: Quantity = ops.where(q <= NEAREST, q, math.nan)
+    return part
 
 
-def clear(ops: Elementwise, distance: Any, d: Any) -> Any:
+def clear(ops: Elementwise, distance: Quantity, d: Quantity) -> Quantity:
     """What a disc leaves of the distance between its centre and a singularity; nan where it comes too near."""
-    return ops.where((distance > 0) & (d <= NEAREST * distance), distance - d, math.nan)
+    left: Quantity = ops.where((distance > 0) & (d <= NEAREST * distance), distance - d, math.nan)
+    return left
 
 
-def exponential(ops: Elementwise, d: Any) -> Any:
+def exponential(ops: Elementwise, d: Quantity) -> Quantity:
     """exp(d) - 1 - d."""
     return ops.of("expm1")(d) - d + slack(d)
 
 
-def even_and_odd(ops: Elementwise, d: Any) -> tuple[Any, Any]:
+def even_and_odd(ops: Elementwise, d: Quantity) -> tuple[Quantity, Quantity]:
     """cosh d - 1 and sinh d - d."""
     half = ops.of("sinh")(0.5 * d)
     return 2 * half * half, ops.of("sinh")(d) - d + slack(d)
@@ -49,17 +50,17 @@ def even_and_odd(ops: Elementwise, d: Any) -> tuple[Any, Any]:
 def waves(value: str, slope: str) -> Remainder:
     """Of sin, cos, sinh and cosh: the derivatives are the two of them by turns."""
 
-    def run(ops: Elementwise, m: Any, d: Any) -> Any:
+    def run(ops: Elementwise, m: Quantity, d: Quantity) -> Quantity:
         even, odd = even_and_odd(ops, d)
         return abs(ops.of(value)(m)) * even + abs(ops.of(slope)(m)) * odd
 
     return run
 
 
-def rising(op: str, slope: Callable[[Elementwise, Any], Any]) -> Remainder:
+def rising(op: str, slope: Callable[[Elementwise, Quantity], Quantity]) -> Remainder:
     """Of a function whose series at 0 has no negative coefficients and reaches to 1: each is largest at |m|."""
 
-    def run(ops: Elementwise, m: Any, d: Any) -> Any:
+    def run(ops: Elementwise, m: Quantity, d: Quantity) -> Quantity:
         near, f = abs(m), ops.of(op)
         far = ops.where(near + d < 1, near + d, math.nan)
         return f(far) - f(near) - slope(ops, near) * d + 4 * EPS * f(far)
@@ -85,7 +86,7 @@ def wave(shift: float) -> Callable[[Elementwise, Ends], Ends]:
         sin, floor, turn = ops.of("sin"), ops.of("floor"), 2 * math.pi
         p, q = sin(lo), sin(hi)
 
-        def meets(place: float) -> Any:
+        def meets(place: float) -> Truth:
             return floor((hi + near - place) / turn) > floor((lo - near - place) / turn)
 
         whole = ops.where(ops.finite(lo) & ops.finite(hi), hi - lo >= turn, True)
@@ -146,7 +147,7 @@ def extreme(least: bool) -> Callable[..., Ends]:
 
 def between_turns(
     ops: Elementwise, op: str, within: tuple[float, float], turns: tuple[float, ...], a: Ends
-) -> tuple[Any, Any, Any]:
+) -> tuple[Quantity, Quantity, Truth]:
     """A builtin of the part of an interval on which it is defined, by its values at the ends and where it turns."""
     f = ops.of(op)
     lo, hi = ops.least(ops.most(a[0], within[0]), within[1]), ops.least(ops.most(a[1], within[0]), within[1])

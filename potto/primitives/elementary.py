@@ -3,26 +3,25 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 from potto.core.terms import ONE, Term, add, branch, const, div, mul, prim, sub
 from potto.primitives.bounds import exponential, share, slack
-from potto.primitives.registry import Elementwise, Primitive, Terms, always, register
+from potto.primitives.registry import Elementwise, Primitive, Quantity, Terms, always, register
 
 NAN = const(math.nan)
 HALF = const(0.5)
 
 
-def _root_remainder(ops: Elementwise, m: Any, d: Any) -> Any:
+def _root_remainder(ops: Elementwise, m: Quantity, d: Quantity) -> Quantity:
     q, root = share(ops, m, d), ops.of("sqrt")
     return root(m) * (1 - 0.5 * q - root(1 - q) + slack(q))
 
 
-def _exp_remainder(ops: Elementwise, m: Any, d: Any) -> Any:
+def _exp_remainder(ops: Elementwise, m: Quantity, d: Quantity) -> Quantity:
     return ops.of("exp")(m) * exponential(ops, d)
 
 
-def _log_remainder(ops: Elementwise, q: Any) -> Any:
+def _log_remainder(ops: Elementwise, q: Quantity) -> Quantity:
     return -ops.of("log1p")(-q) - q + slack(q)
 
 

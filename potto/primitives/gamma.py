@@ -7,11 +7,10 @@ and |z + n| >= Re z + n in the series of the derivatives of its logarithm.
 from __future__ import annotations
 
 import math
-from typing import Any
 
 from potto.core.terms import ONE, ZERO, add, const, mul, neg, prim
 from potto.primitives.bounds import clear
-from potto.primitives.registry import Elementwise, Ends, Primitive, register
+from potto.primitives.registry import Elementwise, Ends, Primitive, Quantity, Truth, register
 
 TOPIC = "The gamma function"
 POSITIVE = (0.0, math.inf)
@@ -19,13 +18,13 @@ LOWEST = 1.4616321449683623  # where gamma is least (NIST, Digital Library of Ma
 TWO = const(2.0)
 
 
-def _curvature(ops: Elementwise, x: Any) -> Any:
+def _curvature(ops: Elementwise, x: Quantity) -> Quantity:
     """The second derivative of gamma."""
     slope = ops.of("digamma")(x)
     return ops.of("gamma")(x) * (slope * slope + ops.of("hurwitz")(2.0, x))
 
 
-def _gamma_remainder(ops: Elementwise, m: Any, d: Any) -> Any:
+def _gamma_remainder(ops: Elementwise, m: Quantity, d: Quantity) -> Quantity:
     """By the second derivative, which is convex."""
     left = clear(ops, m, d)
     return 0.5 * d * d * ops.most(_curvature(ops, left), _curvature(ops, m + d))
@@ -57,11 +56,11 @@ gamma = register(
 )
 
 
-def _zeta_remainder(ops: Elementwise, s: Any, m: Any, d: Any) -> Any:
+def _zeta_remainder(ops: Elementwise, s: Quantity, m: Quantity, d: Quantity) -> Quantity:
     return 0.5 * d * d * s * (s + 1) * ops.of("hurwitz")(s + 2, clear(ops, m, d))
 
 
-def _zeta_bounds(ops: Elementwise, s: Ends, x: Ends) -> tuple[Any, Any, Any]:
+def _zeta_bounds(ops: Elementwise, s: Ends, x: Ends) -> tuple[Quantity, Quantity, Truth]:
     zeta = ops.of("hurwitz")
     return zeta(s[0], ops.most(x[1], 0.0)), zeta(s[0], ops.most(x[0], 0.0)), x[1] < 0
 

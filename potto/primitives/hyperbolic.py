@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 from potto.core.terms import ONE, Term, add, branch, const, div, mul, neg, prim, sub
 from potto.primitives.bounds import clear, rising, waves
-from potto.primitives.registry import Elementwise, Primitive, Terms, always, register
+from potto.primitives.registry import Elementwise, Primitive, Quantity, Terms, always, register
 
 HALF = const(0.5)
 
 
-def _asinh_remainder(ops: Elementwise, m: Any, d: Any) -> Any:
+def _asinh_remainder(ops: Elementwise, m: Quantity, d: Quantity) -> Quantity:
     """By the second derivative -z/(1 + z^2)^1.5, bounded on the disc by its distance from i and -i."""
     return 0.5 * d * d * (abs(m) + d) / clear(ops, ops.of("hypot")(m, 1.0), d) ** 3
 
 
-def _acosh_remainder(ops: Elementwise, m: Any, d: Any) -> Any:
+def _acosh_remainder(ops: Elementwise, m: Quantity, d: Quantity) -> Quantity:
     """By the second derivative -z/(z^2 - 1)^1.5."""
     return 0.5 * d * d * (m + d) / (clear(ops, m - 1, d) * (m + 1 - d)) ** 1.5
 

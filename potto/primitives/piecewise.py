@@ -8,11 +8,10 @@ from __future__ import annotations
 
 import math
 from itertools import combinations
-from typing import Any
 
 from potto.core.terms import ONE, ZERO, Term, add, branch, const, div, mul, neg, prim, sub
 from potto.primitives.bounds import ends, extreme
-from potto.primitives.registry import Elementwise, Ends, Primitive, Terms, register
+from potto.primitives.registry import Elementwise, Ends, Primitive, Quantity, Terms, register
 
 
 def _absolute_roots(y: Term) -> Terms:
@@ -190,7 +189,7 @@ def _between_partials(x: Term, a: Term, b: Term) -> Terms:
 def _between_ends(ops: Elementwise, x: Ends, a: Ends, b: Ends) -> Ends:
     """It rises with x and falls with a and b, where a is before b."""
 
-    def part(x: Any, a: Any, b: Any) -> Any:
+    def part(x: Quantity, a: Quantity, b: Quantity) -> Quantity:
         return ops.most(ops.least((x - a) / (b - a), 1.0), 0.0)
 
     apart = a[1] < b[0]

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 from potto.core.terms import ONE, PI, Term, const, div, mul, neg, prim, sub
 from potto.primitives.bounds import rising
-from potto.primitives.registry import Elementwise, Primitive, register
+from potto.primitives.registry import Elementwise, Primitive, Quantity, register
 
 SLOPE = div(const(2.0), prim("sqrt", PI))  # of erf at 0
 
@@ -16,14 +15,14 @@ def _bell(x: Term) -> Term:
     return mul(SLOPE, prim("exp", neg(mul(x, x))))
 
 
-def _bell_remainder(ops: Elementwise, m: Any, d: Any) -> Any:
+def _bell_remainder(ops: Elementwise, m: Quantity, d: Quantity) -> Quantity:
     """By the second derivative -4z/sqrt(pi) exp(-z^2): x^2 - y^2 is least on the rim, at m/2 if that is in the disc."""
     near = abs(m)
     least = ops.where(2 * d >= near, 0.5 * near * near - d * d, (near - d) * (near - d))
     return 2 / math.sqrt(math.pi) * d * d * (near + d) * ops.of("exp")(-least)
 
 
-def _root_slope(ops: Elementwise, y: Any) -> Any:
+def _root_slope(ops: Elementwise, y: Quantity) -> Quantity:
     root = ops.of("erfinv")(y)
     return 0.5 * math.sqrt(math.pi) * ops.of("exp")(root * root)
 

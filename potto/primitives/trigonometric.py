@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 from potto.core.terms import ONE, PI, Term, add, branch, const, div, mul, neg, prim, sub
 from potto.primitives.bounds import angle, clear, length, rising, tangent, wave, waves
-from potto.primitives.registry import Elementwise, Primitive, Terms, always, register
+from potto.primitives.registry import Elementwise, Primitive, Quantity, Terms, always, register
 
 NAN = const(math.nan)
 HALF_PI = div(PI, const(2.0))
@@ -19,11 +18,11 @@ def _between(y: Term, lo: Term, hi: Term, solution: Term) -> Terms:
     return (branch((sub(y, lo),), False, branch((sub(hi, y),), False, solution, NAN), NAN),)
 
 
-def _asin_slope(ops: Elementwise, x: Any) -> Any:
+def _asin_slope(ops: Elementwise, x: Quantity) -> Quantity:
     return 1 / ops.of("sqrt")((1 - x) * (1 + x))
 
 
-def _atan_remainder(ops: Elementwise, m: Any, d: Any) -> Any:
+def _atan_remainder(ops: Elementwise, m: Quantity, d: Quantity) -> Quantity:
     """By the second derivative -2z/(1 + z^2)^2, bounded on the disc by its distance from i and -i."""
     return d * d * (abs(m) + d) / clear(ops, ops.of("hypot")(m, 1.0), d) ** 4
 

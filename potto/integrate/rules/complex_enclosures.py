@@ -82,7 +82,8 @@ def _power(x: Form, power: Form) -> Form:
     if exponent == int(exponent) and 0 <= exponent <= HIGHEST_POWER:
         return _repeated(x, int(exponent))
     if exponent == int(exponent) and -HIGHEST_POWER <= exponent < 0:
-        a, q, m = exponent, share(OPS, x.m, x.spread), x.m
+        a, m = exponent, x.m
+        q: Any = share(OPS, m, x.spread)
         value, beyond = np.power(m, a), np.power(1 - q, a) - 1 + a * q + slack(q) * abs(a)
         return x.through(value, a * np.divide(value, m), np.abs(value) * beyond)
     return _exp(DISCS.apply("log", (x,)).scaled(exponent))
