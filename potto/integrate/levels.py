@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
-from typing import Any
 
 from msgspec import Struct
 
@@ -15,6 +14,7 @@ from potto.calculus.decomposition.conic_regions import polynomial
 from potto.calculus.decomposition.critical import Within
 from potto.calculus.decomposition.surface_cuts import ConicRegion, Cut
 from potto.calculus.decomposition.sweep import Level
+from potto.calculus.solving.solve import Family
 from potto.core.terms import INF, Lam, Term, function_of, neg, postorder, prim, tuple_
 
 # What the places are that are not cuts, of which none has a number below 0: hints, and such with which no nodes move.
@@ -37,7 +37,7 @@ class LevelPlan(Struct, frozen=True, dict=True):
     frame: Lam
     rows: tuple[tuple[int, bool], ...]
     searched: tuple[Cut, ...]
-    families: tuple[tuple[int, Any], ...]
+    families: tuple[tuple[int, Family], ...]
     decided: tuple[int, ...]
     surfaces: Lam
     turned: tuple[tuple[int, ...], ...]
@@ -119,7 +119,7 @@ def level_plan(level: Level, decided: tuple[int, ...], groups: Sequence[Group]) 
     """The terms of one variable; `decided` are the numbers of the groups among its cuts."""
     terms: list[Term] = [level.lo, level.hi]
     rows: list[tuple[int, bool]] = []  # (which cut, HINT or RESTING; whether turning)
-    families: list[tuple[int, Any]] = []
+    families: list[tuple[int, Family]] = []
     searched: list[Cut] = []
     for number, cut in enumerate(level.cuts):
         if cut.roots is None:

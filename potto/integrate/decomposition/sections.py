@@ -16,6 +16,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from potto.calculus.solving.enclosable import slope_of
+from potto.calculus.solving.solve import Family
 from potto.core.terms import Lam, Term, function_of
 from potto.integrate.columns import side_by_side
 from potto.integrate.decomposition.meetings import SEARCHED, Row, as_array
@@ -24,7 +25,7 @@ from potto.integrate.events import BUDGET_SPENT, ROOTS_NOT_SEPARATED, TOO_MANY_R
 from potto.integrate.levels import LevelPlan
 from potto.integrate.pieces import Evaluator, gather, number_at, still
 from potto.integrate.rules.gauss import EPS
-from potto.kernels.cells import Array, Bools, Cell, Ints, Value, pad
+from potto.kernels.cells import Array, Bools, Cell, Ints, Number, Value, pad
 
 GRID = 64
 MOST_IN_FAMILY = 100_000
@@ -52,7 +53,7 @@ def searched_rows(
     return rows
 
 
-def _at(term: Term, variable: str, x: Any, env: dict[str, Value], machine: Evaluator) -> Any:
+def _at(term: Term, variable: str, x: Number, env: dict[str, Value], machine: Evaluator) -> Number:
     """A term's value with the variable at x, by a machine without directions."""
     function = function_of(term)
     here = {n: still(v) for n, v in env.items() if n in function.params}
@@ -61,7 +62,14 @@ def _at(term: Term, variable: str, x: Any, env: dict[str, Value], machine: Evalu
 
 
 def _family(
-    level: LevelPlan, cut: int, family: Any, env: dict[str, Value], lo: Cell, hi: Cell, batch: int, machine: Evaluator
+    level: LevelPlan,
+    cut: int,
+    family: Family,
+    env: dict[str, Value],
+    lo: Cell,
+    hi: Cell,
+    batch: int,
+    machine: Evaluator,
 ) -> list[Row]:
     ends = [as_array(_at(family.inner, level.variable, x.v, env, machine), batch) for x in (lo, hi)]
     low, high = as_array(np.minimum(lo.v, hi.v), batch), as_array(np.maximum(lo.v, hi.v), batch)

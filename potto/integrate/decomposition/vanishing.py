@@ -161,9 +161,9 @@ def zero_with(node: Term) -> tuple[bool, tuple[Term, ...]]:
             return False, ()
 
 
-def zero_on(test: Vanishing, sides: Mapping[int, Mask]) -> Any:
+def zero_on(test: Vanishing, sides: Mapping[int, Mask]) -> Mask:
     """Evaluate a vanishing test on sides: False, True or a mask."""
-    found: list[Any] = [False, True]
+    found: list[Mask] = [False, True]
     for row in test.rows:
         if isinstance(row, Joined):
             first, *rest = row.parts
@@ -176,7 +176,7 @@ def zero_on(test: Vanishing, sides: Mapping[int, Mask]) -> Any:
     return found[test.whole]
 
 
-def _on_side(above: Mask | None, orientation: int, then: Any, orelse: Any) -> Any:
+def _on_side(above: Mask | None, orientation: int, then: Mask, orelse: Mask) -> Mask:
     if above is None:
         return then & orelse
     if orientation < 0:

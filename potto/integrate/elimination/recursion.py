@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 from msgspec.structs import replace
@@ -133,7 +132,7 @@ def _lacking(sums: Sums, rtol: float, atol: float) -> float:
 
 def _passed_on(
     known: Eliminated,
-    fine: Any,
+    fine: Evaluator,
     env: dict[str, Value],
     ranges: Ranges,
     tables: dict[str, Tables],
@@ -174,7 +173,7 @@ def _passed_on(
 def _density(
     variable: str,
     summands: Sequence[Eliminated],
-    fine: Any,
+    fine: Evaluator,
     env: dict[str, Value],
     ranges: Ranges,
     tables: dict[str, Tables],

@@ -17,7 +17,6 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
-from typing import Any
 
 import numpy as np
 from msgspec import Struct
@@ -31,7 +30,7 @@ from potto.integrate.montecarlo.cube_map import Chart, Point, label_of
 from potto.integrate.montecarlo.surface_terms import Surface
 from potto.integrate.pieces import Evaluator, Sums, numbers_at, still
 from potto.integrate.plan import Plan
-from potto.kernels.cells import Array, Cell, Mask, Value
+from potto.kernels.cells import Array, Cell, Mask, Number, Value
 
 MISSED = 10.0
 FEW = 16
@@ -64,7 +63,7 @@ class Largest(Struct):
                 x = np.sort(np.concatenate(both, axis=-1), axis=-1)[..., -FEW:]
             self.most[name] = np.sort(x, axis=-1)
 
-    def top(self, name: str) -> Any:
+    def top(self, name: str) -> Number:
         x = self.most.get(name)
         return 0.0 if x is None or not x.shape[-1] else x[..., -1]
 
@@ -73,7 +72,7 @@ class Largest(Struct):
         x = self.most.get(name)
         return x is None or x.shape[-1] < FEW or bool((x[..., 0] == 0).any())
 
-    def tail(self, name: str, points: int) -> Any:
+    def tail(self, name: str, points: int) -> Number:
         """What more there may be of the kind of the few largest, as a part of the mean.
 
         They may grow like a power of the number of points, u^-a of u in [0, 1]: what is beyond them then counts more,
@@ -89,7 +88,7 @@ class Largest(Struct):
         return MISSED / points * np.where(excess == 0, 0.0, np.where(x[..., 0] == 0, excess, beyond))
 
 
-def peaks(chart: Chart, drawn: int, f: Callable[[Any, int], Sums], seed: int) -> Sums | None:
+def peaks(chart: Chart, drawn: int, f: Callable[[Point, int], Sums], seed: int) -> Sums | None:
     """The largest magnitudes of samples near the centers that the integrand is known to have; None if it has none.
 
     f: from a point to samples. The values are (m,) and (m, k).

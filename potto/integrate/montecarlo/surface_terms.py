@@ -21,7 +21,6 @@ from collections.abc import Callable
 from contextlib import nullcontext
 from functools import cached_property
 from itertools import zip_longest
-from typing import Any
 
 import numpy as np
 from msgspec import Struct
@@ -38,7 +37,7 @@ from potto.integrate.montecarlo.cube_map import Chart, Point, label_of
 from potto.integrate.montecarlo.lines import End, Line, label_name, leaving, line, offset
 from potto.integrate.montecarlo.passages import ASIDE, Passage
 from potto.integrate.montecarlo.pivot_choice import pivots
-from potto.integrate.pieces import Sums, number_at, still
+from potto.integrate.pieces import Evaluator, Sums, number_at, still
 from potto.integrate.plan import Plan
 from potto.integrate.rules.gauss import EPS
 from potto.kernels.cells import Array, Bools, Cell, Mask, Value, pad
@@ -100,7 +99,7 @@ class Surface(Struct, dict=True):
     integrand: Integrand
 
     @property
-    def machine(self) -> Any:
+    def machine(self) -> Evaluator:
         return self.chart.machine
 
     @cached_property

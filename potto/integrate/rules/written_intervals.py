@@ -218,10 +218,10 @@ class _Mask:
     def __bool__(self) -> bool:
         raise NotStraight("a rule asks what a number is")
 
-    def __and__(self, other: Any) -> Any:
+    def __and__(self, other: _Mask | bool) -> _Mask | bool:
         return (self if other else False) if isinstance(other, bool) else self._with("and", other)
 
-    def __or__(self, other: Any) -> Any:
+    def __or__(self, other: _Mask | bool) -> _Mask | bool:
         return (True if other else self) if isinstance(other, bool) else self._with("or", other)
 
     __rand__, __ror__ = __and__, __or__
@@ -239,34 +239,34 @@ class _Number:
     def __init__(self, at: Carrier, name: str) -> None:
         self.at, self.name = at, name
 
-    def _op(self, code: str, *args: Any) -> _Number:
+    def _op(self, code: str, *args: Operand) -> _Number:
         return _Number(self.at, self.at.apply(code, *(_name(self.at, arg) for arg in args)))
 
-    def _is(self, code: str, other: Any) -> _Mask:
+    def _is(self, code: str, other: Operand) -> _Mask:
         return _Mask(self.at, self.at.apply(code, self.name, _name(self.at, other)))
 
-    def __add__(self, other: Any) -> _Number:
+    def __add__(self, other: Operand) -> _Number:
         return self._op("add", self, other)
 
-    def __radd__(self, other: Any) -> _Number:
+    def __radd__(self, other: Operand) -> _Number:
         return self._op("add", other, self)
 
-    def __sub__(self, other: Any) -> _Number:
+    def __sub__(self, other: Operand) -> _Number:
         return self._op("sub", self, other)
 
-    def __rsub__(self, other: Any) -> _Number:
+    def __rsub__(self, other: Operand) -> _Number:
         return self._op("sub", other, self)
 
-    def __mul__(self, other: Any) -> _Number:
+    def __mul__(self, other: Operand) -> _Number:
         return self._op("mul", self, other)
 
-    def __rmul__(self, other: Any) -> _Number:
+    def __rmul__(self, other: Operand) -> _Number:
         return self._op("mul", other, self)
 
-    def __truediv__(self, other: Any) -> _Number:
+    def __truediv__(self, other: Operand) -> _Number:
         return self._op("div", self, other)
 
-    def __rtruediv__(self, other: Any) -> _Number:
+    def __rtruediv__(self, other: Operand) -> _Number:
         return self._op("div", other, self)
 
     def __neg__(self) -> _Number:
@@ -275,22 +275,22 @@ class _Number:
     def __abs__(self) -> _Number:
         return self._op("abs", self)
 
-    def __lt__(self, other: Any) -> _Mask:
+    def __lt__(self, other: Operand) -> _Mask:
         return self._is("lt", other)
 
-    def __le__(self, other: Any) -> _Mask:
+    def __le__(self, other: Operand) -> _Mask:
         return self._is("le", other)
 
-    def __gt__(self, other: Any) -> _Mask:
+    def __gt__(self, other: Operand) -> _Mask:
         return self._is("gt", other)
 
-    def __ge__(self, other: Any) -> _Mask:
+    def __ge__(self, other: Operand) -> _Mask:
         return self._is("ge", other)
 
-    def __eq__(self, other: object) -> Any:
+    def __eq__(self, other: Operand) -> _Mask:  # type: ignore[override]
         return self._is("eq", other)
 
-    def __ne__(self, other: object) -> Any:
+    def __ne__(self, other: Operand) -> _Mask:  # type: ignore[override]
         return self._is("ne", other)
 
     __hash__ = None  # type: ignore[assignment]
@@ -299,11 +299,14 @@ class _Number:
         raise NotStraight("a rule asks what a number is")
 
 
-def _name(at: Carrier, x: Any) -> str:
+Operand = _Number | float
+
+
+def _name(at: Carrier, x: Operand) -> str:
     return x.name if isinstance(x, _Number) else at.number(float(x))
 
 
-def _mask_name(x: Any) -> str:
+def _mask_name(x: object) -> str:
     if not isinstance(x, _Mask):
         raise NotStraight("a mask that is known")
     return x.name
@@ -315,7 +318,7 @@ class _Ops:
     def __init__(self, at: Carrier) -> None:
         self.at = at
 
-    def of(self, name: str) -> Callable[..., Any]:
+    def of(self, name: str) -> Callable[..., _Number]:
         """The numeric form of a builtin, where a text has a word for it."""
         entry = PRIMITIVES[name]
         code = FUNCTIONS.get(entry.numpy.replace(".", "_"))
@@ -330,10 +333,10 @@ class _Ops:
             return (condition & a) | (~condition & b)
         return _Number(self.at, self.at.apply("select", condition.name, _name(self.at, a), _name(self.at, b)))
 
-    def least(self, a: Any, b: Any) -> _Number:
+    def least(self, a: Operand, b: Operand) -> _Number:
         return _Number(self.at, self.at.apply("min", _name(self.at, a), _name(self.at, b)))
 
-    def most(self, a: Any, b: Any) -> _Number:
+    def most(self, a: Operand, b: Operand) -> _Number:
         return _Number(self.at, self.at.apply("max", _name(self.at, a), _name(self.at, b)))
 
     def finite(self, x: _Number) -> _Mask:
