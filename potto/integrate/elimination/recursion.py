@@ -110,7 +110,7 @@ def one_by_one(
     most = min(settings.max_evals, int(machine.spent) + affordable)
     for share in SHARES:
         finer = replace(settings, rtol=max(share * settings.rtol, FINEST), atol=0.0, max_evals=most)
-        sums = _passed_on(known, machine.asked(finer), env, ranges, {})
+        sums = _passed_on(known, machine.changed(settings=finer), env, ranges, {})
         if not isinstance(sums, Sums):
             break
         sums.e += left_out

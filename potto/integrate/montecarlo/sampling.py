@@ -230,7 +230,7 @@ class _Run(Struct, dict=True):
         groups = (g for s in self.surfaces if s.number >= self.drawn for g, _ in s.forces)
         resting = frozenset(self.plan.groups[g].cut.surface for g in groups)
         settings = self.machine.settings
-        machine = self.machine.asked(replace(settings, rtol=max(settings.rtol, INNER_RTOL)))
+        machine = self.machine.changed(settings=replace(settings, rtol=max(settings.rtol, INNER_RTOL)))
         return Iteration(self.plan, machine, INNER_ORDER, resting)
 
     def means(self) -> Iterator[Mean]:

@@ -109,7 +109,7 @@ class PanelBatch(Struct, dict=True):
 
         `whole`: the pieces are the segments.
         """
-        rows = max(1, min(CHUNK, self.machine.max_evals) // order)  # by so much a budget may be overrun
+        rows = max(1, min(CHUNK, self.machine.settings.max_evals) // order)  # by so much a budget may be overrun
         if p.segment.size > rows:
             return self.in_chunks(p, order, rows)
         rule = gauss(order)

@@ -123,10 +123,6 @@ class Machine:
         return self.settings.atol
 
     @property
-    def max_evals(self) -> int:
-        return self.settings.max_evals
-
-    @property
     def backend(self) -> str:
         """What computes at many points; where it is told how surfaces fall (`falls`), numpy."""
         return "numpy" if self.record.second else self.settings.backend
@@ -137,10 +133,6 @@ class Machine:
         other = object.__new__(Machine)
         other.__dict__.update(self.__dict__, **fields)
         return other
-
-    def asked(self, settings: Settings) -> Machine:
-        """The machine that is asked for something else."""
-        return self.changed(settings=settings)
 
     def with_directions(self, directions: int) -> Machine:
         if directions == self.directions and not self.taping:

@@ -77,7 +77,7 @@ def attempted(problem: Problem, order: Integral, most: int | None) -> Attempt:
     limit = math.inf if most is None else before + most
     bounded = limit < machine.settings.max_evals
     if bounded:
-        machine = machine.asked(replace(machine.settings, max_evals=math.ceil(limit)))
+        machine = machine.changed(settings=replace(machine.settings, max_evals=math.ceil(limit)))
     sums = in_parts(problem.plan(order), machine, problem.env, problem.batch)
     stopped = most is not None and machine.exhausted() and BUDGET_SPENT in dict(machine.events.every(Shortfall))
     return Attempt(order, sums, machine.events, most, stopped, taken=math.ceil(machine.record.spent - before))

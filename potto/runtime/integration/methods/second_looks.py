@@ -49,7 +49,7 @@ def by_less(problem: Problem, order: Integral, sums: Sums) -> Sums:
     for rtol in TOLERANCES:
         most = math.ceil(machine.record.spent + EXTRA * machine.settings.max_evals)
         settings = replace(machine.settings, rtol=max(rtol, machine.rtol), max_evals=most)
-        loose = machine.apart().asked(settings)
+        loose = machine.apart().changed(settings=settings)
         other = in_parts(plan, loose, problem.env, problem.batch)
         met = loose.events.touched(problem.batch, TwoSided, SurfaceFold, Degenerate).any()
         if uncertainty(other) < uncertainty(sums) and not met:
@@ -75,7 +75,7 @@ def by_more(problem: Problem, order: Integral, sums: Sums) -> Sums:
         return sums
     if not missing(problem.term, sums, machine.settings, problem.env).any():
         return sums
-    strict = machine.asked(replace(machine.settings, rtol=MORE * machine.rtol))
+    strict = machine.changed(settings=replace(machine.settings, rtol=MORE * machine.rtol))
     found = attempted(problem.changed(machine=strict), order, math.ceil(2 * machine.record.spent))
     if found.stopped or found.events.touched(problem.batch, TwoSided, SurfaceFold, Degenerate).any():
         return sums
