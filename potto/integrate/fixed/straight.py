@@ -28,6 +28,7 @@ from potto.core.terms import (
     tuple_,
 )
 from potto.integrate.fixed.root_choices import choices_of, chosen, smooth
+from potto.integrate.fixed.steps.stays import PRICE, Stay
 from potto.integrate.fixed.steps.step_integral import StepIntegral, step_integral
 from potto.integrate.levels import LevelPlan
 from potto.integrate.rules.complex_enclosures import enclosable, known_to_discs
@@ -55,6 +56,8 @@ class StraightIntegral(Struct, frozen=True, dict=True, eq=False):
     over; None where they are not. texts: of sums that numpy adds up again and again. choices: what decides by the
     parameters alone which formulas cuts have, 1 or 0 each, as for a quadratic's roots; such a plan is of no use before
     they are `decided`. held: how they were. plans: theirs. steps: the same by step functions, if it has that form.
+    stay: how long its parameters have stayed near each other; None where step functions do for any of them, or nothing
+    else does.
     """
 
     variables: tuple[str, ...]
@@ -75,6 +78,7 @@ class StraightIntegral(Struct, frozen=True, dict=True, eq=False):
     held: tuple[tuple[Term, bool], ...] = ()
     plans: dict[tuple[bool, ...], StraightIntegral] = {}
     steps: StepIntegral | None = None
+    stay: Stay | None = None
 
     @cached_property
     def items(self) -> tuple[tuple[Term, ...], ...]:
@@ -107,7 +111,8 @@ def straight(term: Integral, body: Term, levels: Sequence[LevelPlan]) -> Straigh
         return None
     most, nodes = max(len(level.rows) for level in levels), postorder(body)
     steps = step_integral(term, body) if most > FEW_CUTS else None
-    if steps is None and (len(nodes) > MOST_TERMS or most > MOST_CUTS):
+    few = len(nodes) <= MOST_TERMS and most <= MOST_CUTS  # so that cells may be looked at one by one
+    if steps is None and not few:
         return None
     surfaces = tuple(dict.fromkeys(node.surface for node in nodes if isinstance(node, Branch)))
     cuts = [cut for level in levels for cut in children(level.frame.body)]
@@ -123,10 +128,20 @@ def straight(term: Integral, body: Term, levels: Sequence[LevelPlan]) -> Straigh
         for level, place in zip(levels, places, strict=True)
     )
     shared = tuple(frozenset(place[row] for row in place if row > 1) & {0, 1} for place in places)
+    names = tuple(sorted(free))
+    stay = (
+        None if steps is None or not few or steps.degree is not None else Stay(names, PRICE * most, _reach(frames[0]))
+    )
     return StraightIntegral(
-        term.variables, frames, jumps, turning, shared, body, function_of(tuple_(surfaces)), tuple(sorted(free)),
-        choices=function_of(tuple_(choices)) if choices else None, steps=steps,
+        term.variables, frames, jumps, turning, shared, body, function_of(tuple_(surfaces)), names,
+        choices=function_of(tuple_(choices)) if choices else None, steps=steps, stay=stay,
     )  # fmt: skip
+
+
+def _reach(frame: Lam) -> float:
+    """The length of what a variable runs over, if that is a number, else 0."""
+    low, high, *_ = children(frame.body)
+    return high.value - low.value if isinstance(low, Const) and isinstance(high, Const) else 0.0
 
 
 def _jumps(level: LevelPlan, place: Mapping[int, int]) -> tuple[tuple[Term, tuple[int, ...]], ...]:

@@ -25,7 +25,8 @@ from potto.integrate.fixed.proved_sums.alone import machine_code, promotion, sum
 from potto.integrate.fixed.proved_sums.on_bounds import OnBounds, Place, Tied
 from potto.integrate.fixed.proved_sums.settled import SettledRegion, accurate
 from potto.integrate.fixed.proved_sums.sum_text import RepeatedSum
-from potto.integrate.fixed.regions import LOOSEST, Path, Places, known, region_of, settle
+from potto.integrate.fixed.regions import LOOSEST, Path, Places, Settlement, known, region_of, settle
+from potto.integrate.fixed.steps.stays import Stay
 from potto.integrate.fixed.steps.step_cells import step_cells
 from potto.integrate.fixed.steps.step_gradients import step_gradient
 from potto.integrate.fixed.steps.step_sums import SteppedCall
@@ -257,13 +258,34 @@ def proved_gradient(
 def _summed(plan: StraightIntegral, machine: Evaluator, env: dict[str, Value]) -> MovingTotals | None:
     if _numbers(plan, env) is None or machine.frozen or machine.side:
         return None
+    if plan.steps is None or machine.costs is not None or not _exact(plan, env):
+        return _by_region(plan, machine, env)
+    if plan.stay is not None and (found := _staying(plan, plan.stay, machine, env)):
+        return found
+    if stepped := SteppedCall(plan.steps, machine.tracking()).at(env):
+        machine.count(stepped.nodes)
+        return stepped
+    if step_cells(plan.steps, machine.tracking(), env).fine:
+        return None  # one cell after the other would take the square of that, and leave as much
+    return _by_region(plan, machine, env)
+
+
+def _staying(plan: StraightIntegral, stay: Stay, machine: Evaluator, env: dict[str, Value]) -> MovingTotals | None:
+    """The integral in a region that is settled, or is to be; None where step functions are to do it."""
+    due = stay.due(env)
+    if not due and _known(plan, machine, env) is None:
+        return None
+    if due:
+        stay.paid()
+    try:
+        return _by_region(plan, machine, env)
+    except _NotPlain:
+        return None
+
+
+def _by_region(plan: StraightIntegral, machine: Evaluator, env: dict[str, Value]) -> MovingTotals | None:
+    """The sums over the cells that there are all over a region. Raises _NotPlain."""
     certain = machine.costs is None and _exact(plan, env)
-    if certain and plan.steps is not None:
-        if stepped := SteppedCall(plan.steps, machine.tracking()).at(env):
-            machine.count(stepped.nodes)
-            return stepped
-        if step_cells(plan.steps, machine.tracking(), env).fine:
-            return None  # one cell after the other would take the square of that, and leave as much
     plan, values = _decided(plan, machine, env)
     if values is None:
         return None
@@ -289,6 +311,18 @@ def _summed(plan: StraightIntegral, machine: Evaluator, env: dict[str, Value]) -
     return accurate(totals, _truncation(plan, region, machine.directions, env), machine.rtol, machine.atol)
 
 
+def _known(
+    plan: StraightIntegral, machine: Evaluator, env: dict[str, Value]
+) -> tuple[StraightIntegral, Settlement] | None:
+    """The plan that these parameters decide on, and what is settled about them."""
+    plan, values = _decided(plan, machine, env)
+    if values is None or not plan.settled:
+        return None
+    low, high, *_ = numbers_at(plan.frames[0], machine.tracking(), env)
+    found = known(plan, values, float(high.v - low.v), min(machine.rtol, LOOSEST))
+    return None if found is None else (plan, found)
+
+
 @np.errstate(all="ignore")
 def settled(plan: StraightIntegral, machine: Evaluator, env: dict[str, Value]) -> SettledRegion | SteppedCall | None:
     """What is known of the integral for all parameters near these; None where that is not settled, or not yet."""
@@ -296,15 +330,13 @@ def settled(plan: StraightIntegral, machine: Evaluator, env: dict[str, Value]) -
         return None
     if not _exact(plan, env):
         return None
-    if plan.steps is not None:
-        return SteppedCall(plan.steps, machine.tracking())
-    plan, values = _decided(plan, machine, env)
-    if values is None:
-        return None
-    low, high, *_ = numbers_at(plan.frames[0], machine.tracking(), env)
-    found = known(plan, values, float(high.v - low.v), min(machine.rtol, LOOSEST))
-    if found is None:
-        return None
+    by_steps = None if plan.steps is None else SteppedCall(plan.steps, machine.tracking(), plan.stay)
+    if by_steps is not None and plan.stay is None:
+        return by_steps
+    settlement = _known(plan, machine, env)
+    if settlement is None:
+        return by_steps
+    plan, found = settlement
     region = found.region
     faces = machine_code(plan, region, machine, env)
     awaited = promotion(plan, region, machine, env) if faces is None else None

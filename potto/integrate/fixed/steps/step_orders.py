@@ -22,10 +22,9 @@ from potto.kernels.cells import Array, Cell, Value
 from potto.kernels.making import making
 
 LOW, HIGH = "#low", "#high"
-# Radii of the parameters' discs: of the ends of a cell, as parts of its width, of a height and of any other parameter,
-# as parts of REGION of its size. The smaller ones where nothing is proved with the larger.
-OF_ENDS = 2.0**-4
-SCALES = 1.0, 2.0**-4
+# Radii of the parameters' discs: of the ends of a cell, as parts of its width, and of a height and any other parameter,
+# as parts of its size. The smaller ones where nothing is proved with the larger.
+RADII = (2.0**-3, REGION), (2.0**-4, REGION), (2.0**-8, 2.0**-4 * REGION)
 
 
 class StepProof(Struct, frozen=True):
@@ -97,11 +96,11 @@ def _proved(plan: StepIntegral, numbers: Array, rtol: float) -> StepProof | None
     names, middle = [LOW, HIGH, *plan.names, *others(plan)], numbers[:, 0]
     width, reach = middle[1] - middle[0], middle[1, -1] - middle[0, 0]
     cell = FrameCell(((0, 1),), plan.body.body)
-    for scale in SCALES:
+    for of_ends, of_others in RADII:
         sizes = np.maximum(np.abs(middle[2:]).max(axis=1), reach)
         sizes[: len(plan.names)][list(plan.resting)] = 0.0
         radius = np.empty(middle.shape)
-        radius[:2], radius[2:] = OF_ENDS * scale * width, (REGION * scale * sizes)[:, None]
+        radius[:2], radius[2:] = of_ends * width, (of_others * sizes)[:, None]
         errors, size = error_bounds(
             (plan.variable,), ((var(LOW), var(HIGH)),), cell, dict(zip(names, middle, strict=True)),
             dict(zip(names, radius, strict=True)),

@@ -16,6 +16,7 @@ from msgspec import Struct
 from potto.integrate.fixed.moving_sums import SUMMED, MovingTotals, product
 from potto.integrate.fixed.proved_sums.settled import accurate
 from potto.integrate.fixed.regions import LOOSEST
+from potto.integrate.fixed.steps.stays import Stay
 from potto.integrate.fixed.steps.step_cells import StepCells, step_cells
 from potto.integrate.fixed.steps.step_integral import StepIntegral
 from potto.integrate.fixed.steps.step_orders import enough
@@ -26,13 +27,18 @@ from potto.kernels.whole import PAIRWISE
 
 
 class SteppedCall(Struct, frozen=True):
-    """The integral as a function of its parameters, whatever these are. machine: one that keeps track of rounding."""
+    """The integral as a function of its parameters, whatever these are. machine: one that keeps track of rounding.
+    stay: tells when parameters have stayed near each other for so long that there is a shorter way."""
 
     plan: StepIntegral
     machine: Evaluator
+    stay: Stay | None = None
 
     def at(self, env: dict[str, Any]) -> MovingTotals | None:
-        """The value and its tangents; None where that is not plain, or not as accurate as was asked for."""
+        """The value and its tangents; None where that is not plain, or not as accurate as was asked for, or a shorter
+        way is due."""
+        if self.stay is not None and self.stay.due(env):
+            return None
         machine = self.machine
         found = step_sum(self.plan, machine, env, min(machine.rtol, LOOSEST))
         return None if found is None else accurate(*found, machine.rtol, machine.atol)
