@@ -76,7 +76,7 @@ class LevelPlan(Struct, frozen=True, dict=True):
 
 class Corners(Struct, frozen=True):
     """The corners of a region as a cut: its number, how many lines there are, the numbers of these and of conics, the
-    variable further in with its bounds, and the surfaces of conics and lines."""
+    variable further in with its bounds, and the surfaces of conics and lines; the rest as a `ConicRegion` has it."""
 
     cut: int
     lines: int
@@ -84,6 +84,7 @@ class Corners(Struct, frozen=True):
     within: Within
     surfaces: Lam
     polynomial: Lam | None
+    covers: tuple[int, ...]
 
 
 class Group(Struct, frozen=True):
@@ -157,7 +158,8 @@ def _corners(cut: int, region: ConicRegion) -> Corners:
     numbers = (number for edge in (*region.lines, *region.conics) for number in edge)
     surfaces = function_of(tuple_(region.surfaces))
     polynomial = None if region.polynomial is None else function_of(region.polynomial)
-    return Corners(cut, len(region.lines), function_of(tuple_(tuple(numbers))), region.within, surfaces, polynomial)
+    rows = function_of(tuple_(tuple(numbers)))
+    return Corners(cut, len(region.lines), rows, region.within, surfaces, polynomial, region.covers)
 
 
 def _walls(level: Level, rows: Sequence[tuple[int, bool]]) -> tuple[tuple[tuple[int, ...], ...], Lam]:

@@ -14,6 +14,9 @@ import pytest
 from call_counts import calls_in
 
 import potto
+from potto.core.terms import Lam
+from potto.integrate.decomposition import conic_corners
+from potto.kernels.cells import Array, Bools
 
 STEP = 2.3
 Made = Callable[[int], tuple[str, dict[str, float]]]
@@ -96,6 +99,12 @@ def ellipse(angle: float, far: float, turn: float, a: float, b: float) -> str:
     return f"({c!r}*x + ({s!r})*y - ({x!r}))^2/{a * a!r} + ({c!r}*y - ({s!r})*x - ({y!r}))^2/{b * b!r} < t"
 
 
+def half_planes(n: int) -> tuple[str, dict[str, float]]:
+    """What half planes around a middle cover."""
+    sides = (f"({math.cos(a)!r})*x + ({math.sin(a)!r})*y < t" for a in (2 * math.pi * (k + 0.3) / n for k in range(n)))
+    return f"def f(t) integral ([-2, 2], [-2, 2]) [{' or '.join(sides)}] d(x, y)", {"t": 0.7}
+
+
 def builtins(n: int) -> tuple[str, dict[str, float]]:
     terms = " + ".join(f"sin({k}/{n}*x*t)*exp(-{k}/{n}*x)" for k in range(1, n + 1))
     return f"def f(t) integral [0, 1] ({terms})*[x < t] d(x)", {"t": 0.7}
@@ -111,6 +120,7 @@ def counted(call: Callable[[], Any]) -> tuple[int, int]:
     (triangles, (12, 24, 48)), (polygon, (16, 32, 64)), (discs, (24, 48, 96)),
     (union, (10, 20, 40, 80)), (chain, (10, 20, 40, 80)),
     (ellipses, (10, 20, 40, 80)), (row, (10, 20)),  # of 40 as small and as far away rounding limits the slope
+    (half_planes, (16, 32, 64)),
     (builtins, (80, 160, 320)),  # below, fewer nodes do
 ])  # fmt: skip
 @pytest.mark.parametrize("gradient", [False, True])
@@ -125,3 +135,21 @@ def test_twice_as_much(made: Made, sizes: tuple[int, ...], gradient: bool) -> No
     for small, large in itertools.pairwise(costs):
         assert large[0] <= STEP * small[0]
         assert large[1] <= STEP * small[1]
+
+
+def test_crossings_within_a_union_are_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of n half planes n^2/2 pairs cross, mostly within others: of fewer than n it is asked what both bound."""
+    asked = list[int]()
+    looking = conic_corners._bounds_both
+
+    def noting(v: Array, e: Array, places: conic_corners.Places, polynomial: Lam, machine: Any) -> Bools:
+        asked.append(places.p.size)
+        return looking(v, e, places, polynomial, machine)
+
+    monkeypatch.setattr(conic_corners, "_bounds_both", noting)
+    for n in (16, 32, 64):
+        program, at = half_planes(n)
+        asked.clear()
+        found = potto.compile(program).f(**at)
+        assert abs(found.value - 16) <= found.error < 1e-12  # each point is in one of two that are opposite
+        assert 0 < sum(asked) < n

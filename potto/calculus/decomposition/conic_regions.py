@@ -53,6 +53,7 @@ def _region(
         return None
     bounds = (ZERO, ONE, neg(within.lo)), (ZERO, neg(ONE), within.hi)
     y, by_sides, covers = var(within.variable), None, dict[Cut, int]()
+    each: tuple[int, ...] = ()
     if all(cut.holds for cut in edges):
         lines, conics = ({cut: _turned(cut, of[cut]) for cut in of} for of in (lines, conics))
     else:
@@ -62,8 +63,9 @@ def _region(
         settled = settling(by_sides, [side(n) for n in range(len(edges))])
         covers = {cut: settled.get(side(n), 0) for n, cut in enumerate(edges)} if settled else {}
         by_sides = mul(by_sides, *(var(side(len(edges) + n)) for n in range(2)))
+        each = (*(settled.get(side(n), 0) for n in range(len(edges))), -1, -1)
     surfaces = (*(cut.surface for cut in edges), sub(y, within.lo), sub(y, within.hi))
-    region = ConicRegion((*lines.values(), *bounds), tuple(conics.values()), within, surfaces, by_sides)
+    region = ConicRegion((*lines.values(), *bounds), tuple(conics.values()), within, surfaces, by_sides, each)
     return region, (list(lines), list(conics)), covers
 
 

@@ -94,6 +94,7 @@ class ConicRegion(Struct, frozen=True):
     lines: a, b and c of each; the last two are those above the lower and below the upper bound of y. conics: a to f.
     within: y and its bounds. surfaces: of conics, then of lines, as they were written: multiplied out they lose digits.
     polynomial: what is integrated as a polynomial in the `sides` of conics, then of lines; None for an intersection.
+    covers: of each of these the side, 1 or -1, on which it leaves nothing to the others, 0 where there is none.
     """
 
     lines: tuple[tuple[Term, ...], ...]
@@ -101,6 +102,7 @@ class ConicRegion(Struct, frozen=True):
     within: Within
     surfaces: tuple[Term, ...]
     polynomial: Term | None = None
+    covers: tuple[int, ...] = ()
 
 
 def side(number: int) -> str:

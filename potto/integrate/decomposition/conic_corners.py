@@ -55,28 +55,36 @@ def conic_corners(lines: Sequence[Array], conics: Sequence[Array], span: tuple[A
         p, q, owner = _pairs(v)
         bent = p < conics[0].shape[1]
         places = _conic_crossings(v, e, p[bent], q[bent], owner[bent], span)
-        for n in range(v.shape[1]):
-            own = (places.p == n) | (places.q == n)
-            held = _holds(v[:, n, places.owner], e[:, n, places.owner], places.place, places.off)
-            places = places.pick(own | held)
-    return places
+        return _left(places, v, e, (-1,) * v.shape[1])
 
 
 def mixed_corners(
-    lines: Sequence[Array], conics: Sequence[Array], span: tuple[Array, Array], polynomial: Lam, machine: Evaluator
-) -> Places:
-    """The same where an integrand is a polynomial in the sides of all, also of which two lines cross."""
+    lines: Sequence[Array], conics: Sequence[Array], span: tuple[Array, Array], polynomial: Lam, covers: Sequence[int],
+    machine: Evaluator,
+) -> Places:  # fmt: skip
+    """The same where an integrand is a polynomial in the sides of all, also of which two lines cross. covers: as of a
+    `ConicRegion`. Of n in a union n^2/2 cross, and few of these are within none of the others."""
     with np.errstate(all="ignore"):
         v, e = (_joined(of, more) for of, more in zip(lines, conics, strict=True))
         p, q, owner = _pairs(v)
         bent = p < conics[0].shape[1]
         places = joined([_conic_crossings(v, e, p[bent], q[bent], owner[bent], span),
                          _straight_crossings(v[3:], e[3:], p[~bent], q[~bent], owner[~bent])])  # fmt: skip
-        places = places.pick(np.isfinite(places.place).all(axis=0))
+        places = _left(places.pick(np.isfinite(places.place).all(axis=0)), v, e, covers)
         each = max(1, MOST_NUMBERS // v.shape[1])
         chunks = [slice(i, i + each) for i in range(0, places.p.size, each)]
         kept = [_bounds_both(v, e, places.pick(chunk), polynomial, machine) for chunk in chunks]
     return places.pick(np.concatenate((*kept, np.zeros(0, dtype=bool))))
+
+
+def _left(places: Places, v: Array, e: Array, covers: Sequence[int]) -> Places:
+    """The places that are not, for certain, where one of the other surfaces leaves nothing to them."""
+    for n, way in enumerate(covers):
+        if way:
+            own = (places.p == n) | (places.q == n)
+            held = _holds(-way * v[:, n, places.owner], e[:, n, places.owner], places.place, places.off)
+            places = places.pick(own | held)
+    return places
 
 
 def _pairs(v: Array) -> tuple[Ints, Ints, Ints]:
@@ -89,10 +97,11 @@ def _pairs(v: Array) -> tuple[Ints, Ints, Ints]:
 def _bounds_both(v: Array, e: Array, places: Places, polynomial: Lam, machine: Evaluator) -> Bools:
     """Whether there may be something at places that both surfaces p and q bound."""
     p, q, owner, place, off = places.p, places.q, places.owner, places.place, places.off
-    over, under = ([_holds(sign * v[:, n, owner], e[:, n, owner], place, off) for n in range(v.shape[1])]
-                   for sign in (1.0, -1.0))  # fmt: skip
-    above: Bools = np.stack(over)
-    near, at = above & np.stack(under), np.arange(p.size)
+    above, near = np.empty((2, v.shape[1], p.size), dtype=bool)
+    for n in range(v.shape[1]):
+        value, doubt = _value(v[:, n, owner], e[:, n, owner], place, off)
+        above[n], near[n] = ~(value < -doubt), ~(np.abs(value) > doubt)
+    at = np.arange(p.size)
     near[p, at] = near[q, at] = False
     drawn = np.random.default_rng(0).uniform(LEAST, MOST, (v.shape[1], 1))
     sides = np.where(near, drawn, np.where(above, 1.0, 0.0))
@@ -141,16 +150,22 @@ def _summands(v: Array, x: Array, y: Array) -> Array:
     return np.stack((v[0] * x * x, v[1] * x * y, v[2] * y * y, v[3] * x, v[4] * y, v[5]))
 
 
-def _holds(v: Array, e: Array, place: Array, off: Array) -> Array:
+def _holds(v: Array, e: Array, place: Array, off: Array) -> Bools:
     """Whether places may be on the side of surfaces where something is."""
+    value, doubt = _value(v, e, place, off)
+    found: Bools = ~(value < -doubt)
+    return found
+
+
+def _value(v: Array, e: Array, place: Array, off: Array) -> tuple[Array, Array]:
+    """Surfaces at places, and how far off that is where these may be off."""
     x, y = place
     parts = _summands(v, x, y)
     reach = off + BESIDE * np.abs(place).sum(axis=0)
     slopes = np.abs(2 * v[0] * x + v[1] * y + v[3]) + np.abs(v[1] * x + 2 * v[2] * y + v[4])
     beside = (slopes + np.abs(v[:3]).sum(axis=0) * reach) * reach
     doubt = CLEAR * np.abs(parts).sum(axis=0) + _summands(e, *np.abs(place)).sum(axis=0)
-    found: Array = ~(parts.sum(axis=0) < -(doubt + beside))
-    return found
+    return parts.sum(axis=0), doubt + beside
 
 
 def _parts(cell: Cell, count: int, directions: int) -> tuple[Array, Array, Array, Array]:

@@ -16,7 +16,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from potto.calculus.decomposition.critical import Critical, Within
-from potto.core.terms import Lam, Term, children, var
+from potto.core.terms import Term, children, var
 from potto.integrate.columns import distinct, side_by_side
 from potto.integrate.decomposition.conic_corners import BESIDE, CLEAR, Places, conic_corners, mixed_corners, moving
 from potto.integrate.decomposition.critical_places import common_places
@@ -112,7 +112,7 @@ def corner_rows(
             machine.note(Unsearched(level.variable), np.nonzero(unknown)[0])
         lines = _Lines(*(_apart(of[..., : 3 * region.lines, :], 3) for of in numbers)).in_order()
         conics = tuple(_apart(of[..., 3 * region.lines :, :], 6) for of in numbers[:2])
-        straight, places = _crossing(lines, conics, span, region.polynomial, machine)
+        straight, places = _crossing(lines, conics, span, region, machine)
         found = [(straight[2], *lines.crossings(*straight))]
         if conics[0].size:
             lost = ~(places.off <= NEAR * (1 + np.abs(places.place[0])))
@@ -154,12 +154,12 @@ def _touching(
 
 
 def _crossing(
-    lines: _Lines, conics: Sequence[Array], span: tuple[Array, Array], polynomial: Lam | None, machine: Evaluator
+    lines: _Lines, conics: Sequence[Array], span: tuple[Array, Array], region: Corners, machine: Evaluator
 ) -> tuple[tuple[Ints, Ints, Ints], Places]:
     """Which two lines cross where there may be a corner, and of which member; and where conics take part."""
-    if polynomial is None:
+    if region.polynomial is None:
         return _corners(lines), conic_corners((lines.v, lines.e), conics, span)
-    places = mixed_corners((lines.v, lines.e), conics, span, polynomial, machine)
+    places = mixed_corners((lines.v, lines.e), conics, span, region.polynomial, region.covers, machine)
     first = conics[0].shape[1]
     flat = places.p >= first
     straight = places.pick(flat)
