@@ -99,6 +99,34 @@ def ellipse(angle: float, far: float, turn: float, a: float, b: float) -> str:
     return f"({c!r}*x + ({s!r})*y - ({x!r}))^2/{a * a!r} + ({c!r}*y - ({s!r})*x - ({y!r}))^2/{b * b!r} < t"
 
 
+def weighted_lines(n: int) -> tuple[str, dict[str, float]]:
+    """Half planes that are counted, under a factor that has to do with none of them."""
+    sides = (f"{k}*[({math.cos(a)!r})*x + ({math.sin(a)!r})*y < t]"
+             for k, a in enumerate((2 * math.pi * (k + 0.3) / n for k in range(n)), 1))  # fmt: skip
+    return f"def f(t) integral ([-2, 2], [-2, 2]) exp(-x*y)*({' + '.join(sides)}) d(x, y)", {"t": 0.7}
+
+
+def weighted_discs(n: int) -> tuple[str, dict[str, float]]:
+    """The same of discs around a middle."""
+    discs = (f"{k}*[(x - ({0.3 * math.cos(a)!r}))^2 + (y - ({0.3 * math.sin(a)!r}))^2 < t^2]"
+             for k, a in enumerate((2 * math.pi * (k + 0.3) / n for k in range(n)), 1))  # fmt: skip
+    return f"def f(t) integral ([-2, 2], [-2, 2]) ({' + '.join(discs)})/(3 + x) d(x, y)", {"t": 0.7}
+
+
+def directions(n: int) -> list[tuple[float, float, float]]:
+    """Points all over the unit sphere, none of them along an axis."""
+    heights = (1 - 2 * (k + 0.37) / n for k in range(n))
+    around = (2.399963 * k + 0.2 for k in range(n))
+    return [(math.sqrt(1 - z * z) * math.cos(a), math.sqrt(1 - z * z) * math.sin(a), z)
+            for z, a in zip(heights, around, strict=True)]  # fmt: skip
+
+
+def weighted_planes(n: int) -> tuple[str, dict[str, float]]:
+    """Half spaces that are counted, some of them outside of others."""
+    sides = (f"{k}*[({a!r})*x + ({b!r})*y + ({c!r})*z < t]" for k, (a, b, c) in enumerate(directions(n), 1))
+    return f"def f(t) integral ([-2, 2], [-2, 2], [-2, 2]) exp(-x)*({' + '.join(sides)}) d(x, y, z)", {"t": 0.7}
+
+
 def half_planes(n: int) -> tuple[str, dict[str, float]]:
     """What half planes around a middle cover."""
     sides = (f"({math.cos(a)!r})*x + ({math.sin(a)!r})*y < t" for a in (2 * math.pi * (k + 0.3) / n for k in range(n)))
@@ -120,6 +148,7 @@ def counted(call: Callable[[], Any]) -> tuple[int, int]:
     (triangles, (12, 24, 48)), (polygon, (16, 32, 64)), (discs, (24, 48, 96)),
     (union, (10, 20, 40, 80)), (chain, (10, 20, 40, 80)),
     (ellipses, (10, 20, 40, 80)), (row, (10, 20)),  # of 40 as small and as far away rounding limits the slope
+    (weighted_lines, (8, 16, 32)), (weighted_discs, (4, 8, 16, 32)), (weighted_planes, (8, 16, 32, 64)),
     (half_planes, (16, 32, 64)),
     (builtins, (80, 160, 320)),  # below, fewer nodes do
 ])  # fmt: skip
@@ -135,6 +164,19 @@ def test_twice_as_much(made: Made, sizes: tuple[int, ...], gradient: bool) -> No
     for small, large in itertools.pairwise(costs):
         assert large[0] <= STEP * small[0]
         assert large[1] <= STEP * small[1]
+
+
+@pytest.mark.parametrize("gradient", [False, True])
+def test_half_as_many_cost_no_more(gradient: bool) -> None:
+    """Half spaces that are added up: few of them are integrated as many are."""
+    costs = []
+    for n in (2, 4, 8):
+        sides = (f"{k}*[({a!r})*x + ({b!r})*y + ({c!r})*z < t]" for k, (a, b, c) in enumerate(directions(n), 1))
+        f = potto.compile(f"def f(t) integral ([-2, 2], [-2, 2], [-2, 2]) ({' + '.join(sides)}) d(x, y, z)").f
+        call = potto.grad(f, "t") if gradient else f
+        costs.append(counted(lambda call=call: call(0.7)))  # type: ignore[misc]
+    for small, large in itertools.pairwise(costs):
+        assert small[0] <= large[0] and small[1] <= large[1]
 
 
 def test_crossings_within_a_union_are_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
