@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from potto.core.terms import (
     Branch,
+    Const,
     Integral,
     Lam,
     Term,
