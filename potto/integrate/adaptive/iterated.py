@@ -11,6 +11,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from potto.core.terms import Term
+from potto.integrate.adaptive.corner_peaks import peaks_at_ends
 from potto.integrate.adaptive.refining import integrated
 from potto.integrate.adaptive.root_sums import Rows, over_roots
 from potto.integrate.columns import distinct
@@ -60,6 +61,7 @@ class Iteration(Struct):
 
     still: surfaces that don't move here, since someone else counts what their motion does. tracked: whether the
     integrand brings its rounding along at every node. face: what is integrated instead of the integrand, if anything.
+    peaked: whether the integrand has peaks at the ends of ranges.
     """
 
     plan: Plan
@@ -71,6 +73,7 @@ class Iteration(Struct):
     face: Face | None = None
     first: int = 0
     further_in: float = 1.0
+    peaked: bool = False
 
     @property
     def degrees(self) -> tuple[int | None, ...]:
@@ -80,6 +83,7 @@ class Iteration(Struct):
     def whole(self, env: dict[str, Value], batch: int) -> Sums:
         """The integrals of a batch over all variables, with what they could come to at most counted as added up."""
         self.extent = Extent(len(self.plan.levels), self.machine.directions, batch)
+        self.peaked = peaks_at_ends(self.plan, self.machine, env, batch)
         sums = self.run(0, env, batch, {}, self.machine)
         self.extent.count(sums)
         return sums

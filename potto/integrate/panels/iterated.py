@@ -19,7 +19,7 @@ class Iterated(Protocol):
     """One plan being evaluated by one machine. order: the number of nodes per piece to start with.
 
     tracked: whether the integrand brings its rounding along at every node. degrees: by variable that of what is
-    integrated over it, if it is a polynomial.
+    integrated over it, if it is a polynomial. peaked: whether the integrand has peaks at the ends of ranges.
     """
 
     @property
@@ -30,6 +30,8 @@ class Iterated(Protocol):
     def order(self) -> int: ...
     @property
     def tracked(self) -> bool: ...
+    @property
+    def peaked(self) -> bool: ...
     @property
     def degrees(self) -> tuple[int | None, ...]: ...
     @property

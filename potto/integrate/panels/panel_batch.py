@@ -84,7 +84,8 @@ class PanelBatch(Struct, dict=True):
         self.inner = self.machine.with_directions(self.k + 1) if self.moving else self.machine
         with np.errstate(divide="ignore", invalid="ignore"):
             off = np.maximum(self.seg.ea, self.seg.eb) / (self.seg.b - self.seg.a)
-        self.hinted = any(level.peaks for level in self.parent.plan.levels[self.number :])
+        hints = (level.peaks for level in self.parent.plan.levels[self.number :])
+        self.hinted = self.parent.peaked or any(hints)
         # Whether places are not known at which sections further in cross, appear or turn.
         unsearched = any(event.variable == self.level.variable for event, _ in self.machine.events.every(Unsearched))
         self.blind = unsearched or not all(own.level.complete for own in self.parent.plan.levels[self.number + 1 :])

@@ -1,0 +1,61 @@
+"""What sits at an end of a variable that is not the innermost one, too narrow for any node.
+
+Owns `peaks_at_ends`. At the ends of segments of the innermost variable integrands are looked at anyway. Further out
+that takes an integral each, so it is done only where the integrand itself, at a few places on the ends of ranges, is
+far larger than at places within. Cuts are not looked at.
+"""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+
+from potto.integrate.pieces import Evaluator, components, gather, numbers_at, still
+from potto.integrate.plan import Plan
+from potto.integrate.rules.gauss import PEAK
+from potto.kernels.cells import Array, Bools, Cell, Value
+
+# Where a variable is looked at, in parts of its range; of more variables at fewer places.
+PLACES, FEWER, MANY = (0.0, 0.11, 0.5, 0.89, 1.0), (0.0, 0.5, 1.0), 4
+
+
+def peaks_at_ends(plan: Plan, machine: Evaluator, env: dict[str, Value], batch: int) -> bool:
+    """Whether some member's integrand is far larger on the ends of outer variables than within."""
+    count = len(plan.levels)
+    if count == 1 or plan.over is not None or all(degree is not None for degree in plan.degrees):
+        return False
+    machine = machine.with_directions(0)
+    parts = np.array(list(itertools.product(FEWER if count >= MANY else PLACES, repeat=count)))
+    here = gather({name: still(value) for name, value in env.items()}, np.repeat(np.arange(batch), len(parts)))
+    within, at_end = np.ones(batch * len(parts), dtype=bool), np.zeros(batch * len(parts), dtype=bool)
+    for number, level in enumerate(plan.levels):
+        low, high, *_ = numbers_at(level.frame, machine, here)
+        x, inside = _spread(np.asarray(low.v), np.asarray(high.v), np.tile(parts[:, number], batch))
+        here[level.variable] = Cell(x)
+        within &= inside
+        if number + 1 < count:
+            at_end |= ~inside
+    with np.errstate(all="ignore"):
+        values = components(machine.evaluate(plan.body, {n: here[n] for n in plan.body.params}, None))
+    for cell in values:
+        sizes = np.abs(np.broadcast_to(cell.v, at_end.shape))
+        known = np.isfinite(sizes)
+        ends, middle = (
+            np.where(known & there, sizes, 0.0).reshape(batch, -1).max(axis=1) for there in (at_end, within)
+        )
+        if (ends > PEAK * middle).any():
+            return True
+    return False
+
+
+def _spread(low: Array, high: Array, part: Array) -> tuple[Array, Bools]:
+    """Places at parts of ranges, and which of them are within; ranges without an end are looked at near the other."""
+    with np.errstate(all="ignore"):
+        x = low + part * (high - low)
+        rest = part / (1.0 - part)
+        x = np.where(np.isinf(high) & np.isfinite(low), low + rest, x)
+        x = np.where(np.isinf(low) & np.isfinite(high), high - 1.0 / rest, x)
+        x = np.where(np.isinf(low) & np.isinf(high), 2.0 * part - 1.0, x)
+    at_end: Bools = ((part == 0.0) & np.isfinite(low)) | ((part == 1.0) & np.isfinite(high))
+    return np.where(np.isfinite(x), x, 0.0), ~at_end & np.isfinite(x)
