@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from fractions import Fraction
+from functools import lru_cache
 from math import gcd, isqrt, lcm
 
 from msgspec import Struct
@@ -358,6 +359,7 @@ def _excludes(first: Inequality, second: Inequality) -> bool:
     return total < 0 or (total == 0 and (first.strict or second.strict))
 
 
+@lru_cache(maxsize=1 << 12)
 def implies(first: Inequality, second: Inequality) -> bool:
     """Whether the second holds wherever the first does: its surface is the other's and what is never below 0."""
     more = range_of(multiplied_out(sub(second.surface, first.surface)))

@@ -75,13 +75,14 @@ _SUM = "sum'"  # the name of a sum while it is not taken apart: one that nobody 
 
 class ReadableParts(Struct):
     """Of formulas that are written one after the other. known: what was found for a part of one, by all that this
-    depends on; factors: of atoms; products: that sums are; pause: called before each new part, may raise what ends
-    it."""
+    depends on; factors: of atoms; products: that sums are; written: products of powers, by these and the tangents;
+    pause: called before each new part, may raise what ends it."""
 
     pause: Callable[[], None] = lambda: None
     known: dict[tuple[Term, frozenset[str], frozenset[str]], Term] = {}
     factors: dict[Term, Factors] = {}
     products: dict[tuple[Term, frozenset[str], frozenset[str]], Factors | None] = {}
+    written: dict[tuple[Fraction, tuple[tuple[Monomial, int], ...], frozenset[str]], Term] = {}
 
 
 def readable(
@@ -319,6 +320,12 @@ class _Work:
         return inf if LEFT_OUT in text else len(text) + _TANGENT * sum(text.count(name) for name in self.tangents)
 
     def _product(self, coefficient: Fraction, *monomials: tuple[Monomial, int]) -> Term:
+        key, known = (coefficient, monomials, self.tangents), self.progress.written
+        if key not in known:
+            known[key] = self._written(coefficient, monomials)
+        return known[key]
+
+    def _written(self, coefficient: Fraction, monomials: tuple[tuple[Monomial, int], ...]) -> Term:
         found = Factors(coefficient, {}, [], [])
         for monomial, sign in monomials:
             for base, n in monomial:

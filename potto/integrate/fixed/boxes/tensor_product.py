@@ -110,10 +110,11 @@ def _tensor(orders: tuple[int, ...]) -> tuple[tuple[Array, ...], tuple[Array, ..
     return tuple(g.reshape(-1, 1) for g in grids), tuple(reversed(weights))
 
 
-@lru_cache(maxsize=8)
-def _corners(count: int) -> tuple[Array, ...]:
-    """Those of the unit cube, (N, 1) for each variable."""
-    return tuple(g.reshape(-1, 1) for g in np.meshgrid(*[np.array([0.0, 1.0])] * count, indexing="ij"))
+@lru_cache(maxsize=16)
+def _looks(count: int, corners: bool) -> tuple[Array, ...]:
+    """Two places within the unit cube and, if asked for, its corners, (N, 1) for each variable."""
+    ends = np.meshgrid(*[np.array([0.0, 1.0])] * count, indexing="ij")
+    return tuple(np.append(WITHIN, g if corners else []).reshape(-1, 1) for g in ends)
 
 
 def _at_nodes(
@@ -124,7 +125,7 @@ def _at_nodes(
     volume = size.prod(axis=0)
     found = _means(face, machine, env, low, size, orders)
     number, most = found.number, found.most
-    part = _share(face, machine, env, low, size)
+    part, peaks = _beside(face, machine, env, low, size)
     error, floor = np.zeros(number.shape), (4 * EPS + np.where(part > 4 * EPS, part, 0.0)[:, None]) * most + found.own
     for variable, (n, mean) in enumerate(zip(face.exact, found.along, strict=True)):
         slopes = gauss(mean.shape[2]).slopes
@@ -136,23 +137,28 @@ def _at_nodes(
         if bounds.off is not None:  # at a bound the integrand is at most what its coefficients add up to
             floor += mean.sum(axis=2) * (bounds.off[variable] / size[variable])
     asked = np.maximum(0.5 * machine.rtol * np.abs(number), 0.5 * machine.atol / volume)
-    good: Bools = (error <= np.maximum(asked, 8 * floor)).all(axis=(0, 1)) & (part < 1).all(axis=0)
-    if None in face.exact:
-        good &= (_at_corners(face, machine, env, low, size) <= PEAK * found.largest).all(axis=0)
+    good: Bools = (error <= np.maximum(asked, 8 * floor)).all(axis=(0, 1))
+    good &= ((part < 1) & (peaks <= PEAK * found.largest)).all(axis=0)
     error += floor
     total, bound, most = number * volume, error * volume, most.max(axis=0) * volume
     gross = np.stack((most[0], most[1:].max(axis=0, initial=0.0)))
     return Sums(total[:, 0], bound[:, 0], total[:, 1:], bound[:, 1:], gross=gross), good
 
 
-def _share(face: BoxIntegrand, machine: Evaluator, env: dict[str, Value], low: Array, size: Array) -> Array:
-    """Which part of the integrand its own rounding is, by places within: (m, B)."""
+def _beside(
+    face: BoxIntegrand, machine: Evaluator, env: dict[str, Value], low: Array, size: Array
+) -> tuple[Array, Array]:
+    """Which part of the integrand its own rounding is, by places within, and its largest size at the corners of boxes,
+    what is infinite or no number left out, 0 of polynomials: (m, B) each."""
     there = {name: still(value) for name, value in env.items()}
-    tracking = machine.with_directions(0).tracking()
-    cells = _values(face, tracking, there, low, size, [WITHIN[:, None]] * len(low))
-    numbers, errors = dense(tuple(cells), 0, (WITHIN.size, low.shape[1]))
-    sums = (np.abs(row[:, 0]).sum(axis=1) for row in (numbers, np.zeros(numbers.shape) if errors is None else errors))
-    return part_of(*sums)
+    places = _looks(len(low), None in face.exact)
+    cells = _values(face, machine.with_directions(0).tracking(), there, low, size, places)
+    numbers, errors = dense(tuple(cells), 0, (places[0].size, low.shape[1]))
+    sizes = np.abs(numbers[:, 0])
+    off = np.zeros(sizes.shape) if errors is None else errors[:, 0]
+    within, corners = slice(WITHIN.size), sizes[:, WITHIN.size :]
+    part = part_of(sizes[:, within].sum(axis=1), off[:, within].sum(axis=1))
+    return part, np.where(np.isfinite(corners), corners, 0.0).max(axis=1, initial=0.0)
 
 
 def _means(
@@ -193,12 +199,3 @@ def _values(
     for variable, x, a, b in zip(face.plan.variables, places, low, size, strict=True):
         here[variable] = Cell(a + b * x, None, (None,) * machine.directions)
     return components(machine.evaluate(face.function, {name: here[name] for name in face.function.params}, None))
-
-
-def _at_corners(face: BoxIntegrand, machine: Evaluator, env: dict[str, Value], low: Array, size: Array) -> Array:
-    """The largest size of the integrand at the corners of boxes, (m, B), what is infinite or no number left out."""
-    nodes = _corners(len(low))
-    there = {name: still(value) for name, value in env.items()}
-    cells = _values(face, machine.with_directions(0), there, low, size, nodes)
-    sizes = np.abs([np.broadcast_to(cell.v, (nodes[0].size, low.shape[1])) for cell in cells])
-    return np.asarray(np.where(np.isfinite(sizes), sizes, 0.0).max(axis=1))
