@@ -18,6 +18,7 @@ from potto.integrate.levels import LevelPlan
 from potto.integrate.panels.iterated import Iterated
 from potto.integrate.panels.mending import mend
 from potto.integrate.panels.roundoff import (
+    LOOKED_AT,
     WITHIN,
     few_doubles,
     misplaced,
@@ -39,9 +40,8 @@ MOST_SLACK = 1e6  # how many times the error of a node may be larger that hardly
 UNSURE = 1e-9  # how far off cuts may be, in parts of a segment, until it matters that integrands bend beside them
 # From which part of it on rounding at both ends may be what is left where an integrand vanishes: places within tell.
 HIDDEN = 2.0**-40
-# Up to which part of an integrand its rounding within is no more than what is counted for its variable; and how many
-# segments are looked at within, if there are more.
-CLEAR, LOOKED_AT = 16 * EPS, 64
+# Up to which part of an integrand its rounding within is no more than what is counted for its variable.
+CLEAR = 16 * EPS
 BESIDE = 1e-9  # how far from the ends of a segment, in parts of it, it is looked at just inside
 
 

@@ -24,6 +24,7 @@ SMOOTH, STEP = 1e-13, 1e-6
 # Places within a range, as parts of it, that tell the rounding of an integrand: there not all is 0, or stands still, by
 # symmetry.
 WITHIN = np.array((0.309, 0.618))
+LOOKED_AT = 64  # how many ranges are looked at within, if there are more
 
 
 def few_doubles(seg: Segments, weight: Array) -> bool:

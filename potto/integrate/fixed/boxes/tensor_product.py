@@ -19,15 +19,17 @@ from potto.core.terms import Lam, Term
 from potto.integrate.columns import run_of
 from potto.integrate.fixed.lowered.box_text import NODE_ROUNDING
 from potto.integrate.fixed.straight import StraightIntegral
-from potto.integrate.panels.roundoff import WITHIN, part_of
+from potto.integrate.panels.roundoff import LOOKED_AT, WITHIN, part_of
 from potto.integrate.pieces import Evaluator, Sums, components, dense, gather, still
 from potto.integrate.rules.gauss import EPS, PEAK, gauss, truncation
-from potto.kernels.cells import Array, Bools, Cell, Ints, Value
+from potto.kernels.cells import Array, Bools, Cell, Ints, Value, map_arrays
 
 # Nodes per variable: first few, then more for the boxes that need them.
 ORDERS = (4, 8)
 # Nodes that are evaluated at once.
 POINTS = 1 << 16
+# Up to which part of an integrand its rounding is what is counted for any.
+CLEAR = 4 * EPS
 
 
 class BoxIntegrand(Struct, frozen=True, dict=True, eq=False):
@@ -65,13 +67,15 @@ class Bounds(Struct, frozen=True):
 
 class Means(Struct, frozen=True):
     """Mean values over boxes, (m, 1 + k, B), of the integrand, of its size and of its own error, and per variable the
-    sizes of the Legendre coefficients along it, (m, 1 + k, n, B). largest: (m, B), the largest value at nodes."""
+    sizes of the Legendre coefficients along it, (m, 1 + k, n, B). largest, peaks:
+    (m, B), the largest value at nodes and at corners."""
 
     number: Array
     most: Array
     own: Array
     along: list[Array]
     largest: Array
+    peaks: Array
 
 
 def integrated(
@@ -110,11 +114,14 @@ def _tensor(orders: tuple[int, ...]) -> tuple[tuple[Array, ...], tuple[Array, ..
     return tuple(g.reshape(-1, 1) for g in grids), tuple(reversed(weights))
 
 
-@lru_cache(maxsize=16)
-def _looks(count: int, corners: bool) -> tuple[Array, ...]:
-    """Two places within the unit cube and, if asked for, its corners, (N, 1) for each variable."""
-    ends = np.meshgrid(*[np.array([0.0, 1.0])] * count, indexing="ij")
-    return tuple(np.append(WITHIN, g if corners else []).reshape(-1, 1) for g in ends)
+@lru_cache(maxsize=64)
+def _places(orders: tuple[int, ...], corners: bool) -> tuple[Array, ...]:
+    """The nodes of each variable and, if asked for, the corners of the unit cube behind them, (N, 1) each."""
+    nodes, _ = _tensor(orders)
+    if not corners:
+        return nodes
+    ends = np.meshgrid(*[np.array([0.0, 1.0])] * len(orders), indexing="ij")
+    return tuple(np.append(x, end).reshape(-1, 1) for x, end in zip(nodes, ends, strict=True))
 
 
 def _at_nodes(
@@ -125,8 +132,8 @@ def _at_nodes(
     volume = size.prod(axis=0)
     found = _means(face, machine, env, low, size, orders)
     number, most = found.number, found.most
-    part, peaks = _beside(face, machine, env, low, size)
-    error, floor = np.zeros(number.shape), (4 * EPS + np.where(part > 4 * EPS, part, 0.0)[:, None]) * most + found.own
+    part = _share(face, machine, env, low, size)
+    error, floor = np.zeros(number.shape), (CLEAR + np.where(part > CLEAR, part, 0.0)[:, None]) * most + found.own
     for variable, (n, mean) in enumerate(zip(face.exact, found.along, strict=True)):
         slopes = gauss(mean.shape[2]).slopes
         if n is None:
@@ -138,27 +145,46 @@ def _at_nodes(
             floor += mean.sum(axis=2) * (bounds.off[variable] / size[variable])
     asked = np.maximum(0.5 * machine.rtol * np.abs(number), 0.5 * machine.atol / volume)
     good: Bools = (error <= np.maximum(asked, 8 * floor)).all(axis=(0, 1))
-    good &= ((part < 1) & (peaks <= PEAK * found.largest)).all(axis=0)
+    good &= ((part < 1) & (found.peaks <= PEAK * found.largest)).all(axis=0)
     error += floor
     total, bound, most = number * volume, error * volume, most.max(axis=0) * volume
     gross = np.stack((most[0], most[1:].max(axis=0, initial=0.0)))
     return Sums(total[:, 0], bound[:, 0], total[:, 1:], bound[:, 1:], gross=gross), good
 
 
-def _beside(
-    face: BoxIntegrand, machine: Evaluator, env: dict[str, Value], low: Array, size: Array
-) -> tuple[Array, Array]:
-    """Which part of the integrand its own rounding is, by places within, and its largest size at the corners of boxes,
-    what is infinite or no number left out, 0 of polynomials: (m, B) each."""
+def _share(face: BoxIntegrand, machine: Evaluator, env: dict[str, Value], low: Array, size: Array) -> Array:
+    """Which part of the integrand its own rounding is, by places within: (m, B), or (m, 1) where it is next to nothing
+    of all boxes by which the others are judged."""
+    index = _telling(env, low, size)
+    if index.size < low.shape[1]:
+        part = _shares(face, machine, gather(env, index), low[:, index], size[:, index])
+        if (part <= CLEAR).all():
+            return np.zeros((part.shape[0], 1))
+    return _shares(face, machine, env, low, size)
+
+
+def _telling(env: dict[str, Value], low: Array, size: Array) -> Ints:
+    """Some boxes, evenly spaced, and those with the least and the largest of each number that tells them apart."""
+    count = low.shape[1]
+    rows = [*low, *size]
+
+    def note(array: Array) -> Array:
+        rows.append(array)
+        return array
+
+    for value in env.values():
+        map_arrays(value, note)
+    ends = [int(end) for row in rows if row.shape == (count,) for end in (row.argmin(), row.argmax())]
+    return np.union1d(np.linspace(0, count - 1, min(count, LOOKED_AT)).astype(np.int64), ends)
+
+
+def _shares(face: BoxIntegrand, machine: Evaluator, env: dict[str, Value], low: Array, size: Array) -> Array:
     there = {name: still(value) for name, value in env.items()}
-    places = _looks(len(low), None in face.exact)
-    cells = _values(face, machine.with_directions(0).tracking(), there, low, size, places)
-    numbers, errors = dense(tuple(cells), 0, (places[0].size, low.shape[1]))
-    sizes = np.abs(numbers[:, 0])
-    off = np.zeros(sizes.shape) if errors is None else errors[:, 0]
-    within, corners = slice(WITHIN.size), sizes[:, WITHIN.size :]
-    part = part_of(sizes[:, within].sum(axis=1), off[:, within].sum(axis=1))
-    return part, np.where(np.isfinite(corners), corners, 0.0).max(axis=1, initial=0.0)
+    tracking = machine.with_directions(0).tracking()
+    cells = _values(face, tracking, there, low, size, [WITHIN[:, None]] * len(low))
+    numbers, errors = dense(tuple(cells), 0, (WITHIN.size, low.shape[1]))
+    sums = (np.abs(row[:, 0]).sum(axis=1) for row in (numbers, np.zeros(numbers.shape) if errors is None else errors))
+    return part_of(*sums)
 
 
 def _means(
@@ -166,29 +192,33 @@ def _means(
 ) -> Means:
     """What the nodes of a rule amount to."""
     nodes, weights = _tensor(orders)
-    count = low.shape[1]
-    cells = _values(face, machine, env, low, size, nodes)
+    count, inside = low.shape[1], slice(nodes[0].size)
+    places = _places(orders, None in face.exact)
+    cells = _values(face, machine, env, low, size, places)
     shape = (len(cells), 1 + machine.directions)
     number, most, own = np.zeros((3, *shape, count))
-    largest = np.zeros((len(cells), count))
+    largest, peaks = np.zeros((2, len(cells), count))
     along = [np.zeros((*shape, n, count)) for n in orders]
     for i, cell in enumerate(cells):
         for c, (values, off) in enumerate(zip((cell.v, *cell.t), (cell.e, *cell.et), strict=True)):
             if values is None:
                 continue
-            h: Array = np.broadcast_to(values, (nodes[0].size, count))
-            most[i, c] = weights[0] @ np.abs(h)
+            everywhere: Array = np.broadcast_to(values, (places[0].size, count))
+            h, sizes = everywhere[inside], np.abs(everywhere)
+            most[i, c] = weights[0] @ sizes[inside]
             if c == 0:
-                largest[i] = np.abs(h).max(axis=0)
+                largest[i] = sizes[inside].max(axis=0)
+                corners = sizes[nodes[0].size :]
+                peaks[i] = np.where(np.isfinite(corners), corners, 0.0).max(axis=0, initial=0.0)
             if off is not None:
-                own[i, c] = weights[0] @ np.broadcast_to(off, h.shape)
+                own[i, c] = weights[0] @ np.broadcast_to(off, everywhere.shape)[inside]
             for n, rest, mean in zip(orders, weights[1:], along, strict=True):  # one after another, outermost first
                 coefficients = gauss(n).transform.T @ h.reshape(n, -1)
                 sizes = np.abs(coefficients).reshape(n, rest.size, count)
                 mean[i, c] = sizes[:, 0] if rest.size == 1 else rest @ sizes
                 h = coefficients[0].reshape(rest.size, count)
             number[i, c] = h[0]
-    return Means(number, most, own, along, largest)
+    return Means(number, most, own, along, largest, peaks)
 
 
 def _values(
