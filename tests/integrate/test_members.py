@@ -231,11 +231,11 @@ def test_places_of_folds_go_with_their_members() -> None:
 
 
 def test_members_that_rounding_spoils_are_cut_once_in_each_order(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of slivers, up to a 64th of a pixel wide, some have so little of their tips in a pixel that no rule has all
+    """Of slivers, up to a 200th of a pixel wide, some have so little of their tips in a pixel that no rule has all
     digits of the derivatives. Those for which no rule goes at all may be tried once more by themselves, a handful."""
     random = np.random.default_rng(1)
     corners = random.random((6, 4000))
-    corners[2:4] = corners[:2] + 1e-3 * random.random((2, 4000))
+    corners[2:4] = corners[:2] + 3e-4 * random.random((2, 4000))
     (ax, ay), (bx, by), (cx, cy) = corners.reshape(3, 2, -1)
     turned = (bx - ax) * (cy - ay) < (cx - ax) * (by - ay)
     corners = np.where(turned, corners[[0, 1, 4, 5, 2, 3]], corners)

@@ -23,9 +23,9 @@ ENDS = 2  # of a stretch, behind those nodes at which rounding is followed
 class Axis(Struct, frozen=True, eq=False):
     """Nodes of a variable on [0, 1]; what machine code is told of them is found by the axis itself (`lowered.cells`).
 
-    speeds: how fast they run, as they crowd at turning points, where roots are. transform: (n, rows) from numbers at
-    the nodes to the Legendre coefficients that are asked for, the first of which is the mean. few, few_speeds: those
-    nodes at which rounding is followed, then both ends.
+    nodes: known to 2 half places of 1. speeds: how fast they run, as they crowd at turning points, where roots are.
+    transform: (n, rows) from numbers at the nodes to the Legendre coefficients that are asked for, the first of which
+    is the mean. few, few_speeds: those nodes at which rounding is followed, then both ends.
     """
 
     nodes: Array

@@ -18,8 +18,8 @@ from potto.integrate.fixed.edges import EDGE, edges_of
 from potto.integrate.fixed.moving_sums import product
 from potto.integrate.fixed.straight import RowNumbers, StraightIntegral, rows_between
 from potto.integrate.pieces import Evaluator, dense, numbers_at, still
-from potto.integrate.rules.gauss import EPS
 from potto.kernels.cells import Array, Bools, Cell, Ints, Value, map_arrays
+from potto.kernels.whole import UNIT_ROUNDOFF
 
 
 class Nodes(Struct, frozen=True):
@@ -88,8 +88,7 @@ class _Cells(Struct, frozen=True):
             numbers, lost = dense(values, k, shape)
             ends = self.picked(numbers, i)
             lo, width = ends[0], ends[1] - ends[0]
-            off = EPS * np.abs(ends)
-            own = off.sum(axis=0)
+            own, off = misplaced(ends, width)
             if lost is not None:
                 off += self.picked(lost, i)
             widths.append((width, off))
@@ -181,6 +180,20 @@ class _Cells(Struct, frozen=True):
             off = product(off, size) + slack
             most = product(most, size)
         return off, most
+
+
+def misplaced(ends: Array, width: Array) -> tuple[Array, Array]:
+    """How far rounding puts the nodes of stretches off, and both ends, (2, ...), which may be off themselves.
+
+    The nodes are those of a stretch that begins at its lower end and is as long as the width that was worked out, so
+    that its upper end is off by the rounding of that: u |width| with u = UNIT_ROUNDOFF. A node lo + width t rounds the
+    sum, the product and t, which is off by 2 u at the most (`axes`): to first order by
+    u (|lo + width t| + |width| t + 2 |width|) in all.
+    """
+    short = UNIT_ROUNDOFF * np.abs(width)
+    off = np.zeros_like(ends)
+    off[1] = short
+    return UNIT_ROUNDOFF * np.abs(ends).max(axis=0) + 3.0 * short, off
 
 
 def _between(count: int) -> tuple[slice, ...]:

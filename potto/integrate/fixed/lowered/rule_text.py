@@ -19,9 +19,9 @@ from potto.integrate.fixed.lowered.formula_text import Dual, Env, ParameterPlace
 from potto.integrate.fixed.lowered.row_text import RowText
 from potto.integrate.fixed.straight import ROW_BITS, StraightIntegral, row_shift
 from potto.integrate.pieces import Evaluator
-from potto.integrate.rules.gauss import EPS
 from potto.kernels.native.elementary import module
 from potto.kernels.native.vectors import LANES
+from potto.kernels.whole import UNIT_ROUNDOFF
 
 NAME = "rule"
 # Numbers of the frame: how many members, how long the rows of results are, and where, how many ends of each stretch are
@@ -287,13 +287,20 @@ class RuleText(RowText):
                 between = at.apply("and", at.apply("gt", cell.v, low.v), at.apply("lt", cell.v, high.v))
                 fine = at.apply("and", fine, at.apply("not", between))
             self.only(fine)
-        rounding = [[self.times(self.size(x), at.number(EPS)) for x in end] for end in (lower, upper)]
-        own, lost = [], []
-        for x, y in zip(*rounding, strict=True):
-            own.append(self.total(x, y))
-        for end, row in zip((low, high), rounding, strict=True):
-            lost.append([self.total(x, error) for x, error in zip_longest(row, (end.e, *end.et))])
+        own, short = self.misplaced(lower, upper, width)
+        nothing: Dual = [None] * self.k1
+        lost = [[self.total(x, error) for x, error in zip_longest(row, (end.e, *end.et))]
+                for row, end in ((nothing, low), (short, high))]  # fmt: skip
         return lower, width, own, lost
+
+    def misplaced(self, lower: Dual, upper: Dual, width: Dual) -> tuple[Dual, Dual]:
+        """How far rounding puts nodes off, and an upper end, by the formulas that `cells.nodes` has for that."""
+        at, own, unit = self.at, Dual(), self.at.number(UNIT_ROUNDOFF)
+        short = [self.times(self.size(long), unit) for long in width]
+        for low, high, off in zip(map(self.size, lower), map(self.size, upper), short, strict=True):
+            far = at.apply("max", low, high) if low and high else low or high
+            own.append(self.total(self.times(unit, far), self.times(at.number(3.0), off)))
+        return own, short
 
     def node(self, low: Dual, width: Dual, u: str, lost: Dual | None = None) -> Symbol:
         """A node, which moves with the ends of its stretch."""
