@@ -64,9 +64,12 @@ def by_more(problem: Problem, order: Integral, sums: Sums) -> Sums:
 
     What integrals further in may be off by is measured by the largest of them. Derivatives that cancel further out, or
     many nodes whose bounds add up, leave more than was asked for, though evaluations are left; where rounding is what
-    limits them the bounds stay what they are. Not where that would take long: it may take twice as many evaluations.
+    limits them the bounds stay what they are, as of a polynomial between planes, for which rules are exact. Not where
+    that would take long: it may take twice as many evaluations.
     """
     machine, plan = problem.machine, problem.plan(order)
+    if plan.degrees and None not in plan.degrees:
+        return sums
     if len(plan.levels) < 2 or plan.confused or (machine.directions and not plan.reaches):
         return sums
     if machine.record.spent > EXTRA * machine.settings.max_evals or uncertainty(sums) > ONLY_ROUNDED:
