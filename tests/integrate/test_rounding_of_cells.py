@@ -144,6 +144,37 @@ def test_triangles_in_a_pixel_of_any_size(
     held(answer, corners, px, py, h)
 
 
+@pytest.mark.parametrize("backend", ["numpy", "native"])
+@pytest.mark.parametrize("scale", [1e-8, 1.0, 1e8])
+def test_a_line_across_a_square_of_any_size(scale: float, backend: Any) -> None:
+    """Also where it is 1e-8 of the square away from a corner. Of a function of x + y twice its antiderivative K, which
+    is 0 on the dark side of the line: K(2 + c) - 2 K(1 + c) + K(c), at 50 digits."""
+    if backend == "native":
+        pytest.importorskip("llvmlite")
+    near = [corner + side * off for corner in (-2, -1, 0) for off in (1e-8, 1e-5, 1e-3) for side in (-1, 1)]
+    c = np.array([*near, *np.random.default_rng(4).uniform(-1.99, -0.01, 1000)]) * scale
+    with mp.workdps(50):
+        long, root = mp.mpf(scale), mp.sqrt(2)
+
+        def folded(z: mp.mpf) -> tuple[mp.mpf, mp.mpf]:
+            """K(z) and its slope."""
+            z = max(z, mp.mpf(0))
+            slope = 1 / mp.sqrt(8) - 1 / (root * (root * z / long + 2))
+            return long * long * (z / long / mp.sqrt(8) - mp.log(root * z / long / 2 + 1) / 2), long * slope
+
+        parts = [[folded(mp.mpf(float(x)) + k * long) for k in (2, 1, 0)] for x in c]
+        exact = [[a[i] - 2 * b[i] + d[i] for i in (0, 1)] for a, b, d in parts]
+        shader, square = f"1/(sqrt(2)*(x + y + c)/{scale!r} + 2)^2", f"([0, {scale!r}], [0, {scale!r}])"
+        text = f"def f(c) integral {square} {shader}*[x + y + c >= 0] d(x, y)"
+        with potto.settings(backend=backend):
+            answer = potto.grad(potto.compile(text).f, "c")(c)
+        for i, (value, slope) in enumerate(exact):
+            assert abs(mp.mpf(float(answer.value[i])) - value) <= answer.error[i]
+            assert abs(mp.mpf(float(answer.tangent[i])) - slope) <= answer.tangent_error[i]
+    lit = answer.value > 1e-3 * scale * scale
+    assert (answer.error[lit] <= 1e-12 * answer.value[lit]).all()
+
+
 def test_errors_of_small_pixels_are_those_of_their_cuts() -> None:
     """Pixels of a picture are short for how far from 0 they are. A half place of a double there, once for each end, is
     6e-14 of the length of one; nodes and ends that are said to be off by two more for each, whatever they are, have
