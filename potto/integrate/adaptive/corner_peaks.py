@@ -2,7 +2,7 @@
 
 Owns `peaks_at_ends`. At the ends of segments of the innermost variable integrands are looked at anyway. Further out
 that takes an integral each, so it is done only where the integrand itself, at a few places on the ends of ranges, is
-far larger than at places within. Cuts are not looked at.
+far larger than at places within, and than beside them: not where a bracket holds at ends alone. Cuts are not looked at.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from potto.kernels.cells import Array, Bools, Cell, Value
 
 # Where a variable is looked at, in parts of its range; of more variables at fewer places.
 PLACES, FEWER, MANY = (0.0, 0.11, 0.5, 0.89, 1.0), (0.0, 0.5, 1.0), 4
+BESIDE = 2.0**-9  # how far from the ends it is looked beside them: a fifth of the way to the first of eleven nodes
 
 
 def peaks_at_ends(plan: Plan, machine: Evaluator, env: dict[str, Value], batch: int) -> bool:
@@ -27,24 +28,27 @@ def peaks_at_ends(plan: Plan, machine: Evaluator, env: dict[str, Value], batch: 
         return False
     machine = machine.with_directions(0)
     parts = np.array(list(itertools.product(FEWER if count >= MANY else PLACES, repeat=count)))
-    here = gather({name: still(value) for name, value in env.items()}, np.repeat(np.arange(batch), len(parts)))
-    within, at_end = np.ones(batch * len(parts), dtype=bool), np.zeros(batch * len(parts), dtype=bool)
+    beside = parts.copy()
+    beside[:, :-1] = np.clip(beside[:, :-1], BESIDE, 1.0 - BESIDE)
+    each = np.concatenate((parts, beside))
+    here = gather({name: still(value) for name, value in env.items()}, np.repeat(np.arange(batch), len(each)))
+    within, at_end = np.ones(batch * len(each), dtype=bool), np.zeros(batch * len(each), dtype=bool)
     for number, level in enumerate(plan.levels):
         low, high, *_ = numbers_at(level.frame, machine, here)
-        x, inside = _spread(np.asarray(low.v), np.asarray(high.v), np.tile(parts[:, number], batch))
+        x, inside = _spread(np.asarray(low.v), np.asarray(high.v), np.tile(each[:, number], batch))
         here[level.variable] = Cell(x)
         within &= inside
         if number + 1 < count:
             at_end |= ~inside
     with np.errstate(all="ignore"):
         values = components(machine.evaluate(plan.body, {n: here[n] for n in plan.body.params}, None))
+    shape = batch, 2, len(parts)
     for cell in values:
         sizes = np.abs(np.broadcast_to(cell.v, at_end.shape))
-        known = np.isfinite(sizes)
-        ends, middle = (
-            np.where(known & there, sizes, 0.0).reshape(batch, -1).max(axis=1) for there in (at_end, within)
-        )
-        if (ends > PEAK * middle).any():
+        sizes = np.where(np.isfinite(sizes), sizes, 0.0)
+        middle = np.where(within, sizes, 0.0).reshape(batch, -1).max(axis=1, keepdims=True)
+        ends, near = np.moveaxis(sizes.reshape(shape), 1, 0)
+        if (at_end.reshape(shape)[:, 0] & (ends > PEAK * np.maximum(near, middle))).any():
             return True
     return False
 
