@@ -14,9 +14,9 @@ from msgspec import Struct
 
 from potto.applications.integral_pictures import integral_svg, words
 from potto.applications.integral_views import FRAME, IntegralNumbers, IntegralView, Viewer, numbers
-from potto.calculus.explanation.notation import Notation, numbers_of
+from potto.calculus.explanation.notation import written_notation
 from potto.checking.regions import DrawnIntegral, indices, regions
-from potto.core.terms import ZERO, Lam, Term, app, global_, lam, tuple_, var
+from potto.core.terms import ZERO, Lam, Term, app, lam, tuple_, var
 from potto.diagnostics import PottoError
 from potto.elaborate import core, elaborate_expression
 from potto.evaluating.world import World
@@ -76,7 +76,7 @@ class IntegralScene:
         self.fits = {p.name: p.fits for p in found.parameters if p.kind == "function"}
         self._parts: dict[str, str] = {}  # what the program calls the numbers of a tuple or a record
         arguments = iter(self._arguments(found, given))
-        self._notation = Notation(numbers=numbers_of(world.db, global_(target.file, target.name)))
+        self._notation = written_notation(world.db, target.file, target.name)
         call = core(world.db, target.file, target.name).term
         for group in groups_of(interface(world.db, target.file, target.name).type):
             call = app(call, tuple(next(arguments) for _ in group))

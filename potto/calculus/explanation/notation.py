@@ -1,6 +1,6 @@
 """How the formulas of a program are written: in its own words, which are those that its author reads.
 
-Owns `Notation`, `notation_of`, `numbers_in` and `numbers_of`.
+Owns `Notation`, `notation_of`, `written_notation`, `numbers_in` and `numbers_of`.
 """
 
 from __future__ import annotations
@@ -41,9 +41,14 @@ class Notation(Struct, frozen=True):
         return format_equation(simplify(in_decimals(surface)), variables, self.numbers)
 
 
+def written_notation(db: Database, file: str, name: str) -> Notation:
+    """How the conditions of a definition are written, in which fields have no names."""
+    return Notation(numbers=numbers_of(db, global_(file, name)))
+
+
 def notation_of(db: Database, file: str, name: str) -> Notation:
     """That of a definition."""
-    return Notation(fields_of(db, interface(db, file, name).type), numbers_of(db, global_(file, name)))
+    return Notation(fields_of(db, interface(db, file, name).type), written_notation(db, file, name).numbers)
 
 
 def numbers_in(*programs: nodes.Node | None) -> Numbers:

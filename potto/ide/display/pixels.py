@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from msgspec import Struct
 
 from potto.calculus.checking.conditions import Condition
+from potto.calculus.explanation.notation import written_notation
 from potto.calculus.inlining.currying import parameters_of
 from potto.core.printer import format_term
 from potto.core.simplify import simplify
@@ -22,7 +23,6 @@ from potto.ide.hover.derivatives import (
     conditions,
     is_sound,
     shown_equation,
-    written_notation,
 )
 from potto.query import Database, query
 from potto.source import Span

@@ -15,13 +15,13 @@ from potto.calculus.checking.diffeo import DiffeoInfo, diffeo_info, exported
 from potto.calculus.checking.solvability import ConditionProblem, Verdict, judge
 from potto.calculus.explanation.explain import explain_derivative
 from potto.calculus.explanation.layout import DerivativeText, IntegralText
-from potto.calculus.explanation.notation import Notation, numbers_of
+from potto.calculus.explanation.notation import Notation, written_notation
 from potto.calculus.explanation.readable import readable
 from potto.calculus.inlining.currying import parameters_of
 from potto.calculus.solving.inverse_map import InverseMap, invert
 from potto.checking.check import has_errors
 from potto.core.simplify import simplify
-from potto.core.terms import ONE, ZERO, Deriv, Global, Hole, Lam, Term, global_, integral, postorder
+from potto.core.terms import ONE, ZERO, Deriv, Global, Hole, Lam, Term, integral, postorder
 from potto.elaborate import core, core_term, elaborate_expression
 from potto.ide.names.live_expressions import wrong_with
 from potto.modules import definition, dependencies, is_recursive, references
@@ -132,11 +132,6 @@ def condition_infos(db: Database, file: str, name: str, given: Functions = ()) -
         )
         out[_info(notation, span, condition.coordinates, condition.variables, verdict, moved, condition.calls)] = None
     return tuple(sorted(out, key=lambda info: info.span))
-
-
-def written_notation(db: Database, file: str, name: str) -> Notation:
-    """How the conditions of a definition are written."""
-    return Notation(numbers=numbers_of(db, global_(file, name)))
 
 
 def _info(

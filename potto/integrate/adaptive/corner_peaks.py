@@ -8,6 +8,7 @@ far larger than at places within, and than beside them: not where a bracket hold
 from __future__ import annotations
 
 import itertools
+from functools import lru_cache
 
 import numpy as np
 
@@ -16,8 +17,8 @@ from potto.integrate.plan import Plan
 from potto.integrate.rules.gauss import PEAK
 from potto.kernels.cells import Array, Bools, Cell, Value
 
-# Where a variable is looked at, in parts of its range; of more variables at fewer places.
-PLACES, FEWER, MANY = (0.0, 0.11, 0.5, 0.89, 1.0), (0.0, 0.5, 1.0), 4
+# Where variables are looked at, in parts of their ranges; of more, each at its own ends with the others in the middle.
+PLACES, MANY = (0.0, 0.11, 0.5, 0.89, 1.0), 4
 BESIDE = 2.0**-9  # how far from the ends it is looked beside them: a fifth of the way to the first of eleven nodes
 
 
@@ -27,7 +28,7 @@ def peaks_at_ends(plan: Plan, machine: Evaluator, env: dict[str, Value], batch: 
     if count == 1 or plan.over is not None or all(degree is not None for degree in plan.degrees):
         return False
     machine = machine.with_directions(0)
-    parts = np.array(list(itertools.product(FEWER if count >= MANY else PLACES, repeat=count)))
+    parts = _parts(count)
     beside = parts.copy()
     beside[:, :-1] = np.clip(beside[:, :-1], BESIDE, 1.0 - BESIDE)
     each = np.concatenate((parts, beside))
@@ -51,6 +52,17 @@ def peaks_at_ends(plan: Plan, machine: Evaluator, env: dict[str, Value], batch: 
         if (at_end.reshape(shape)[:, 0] & (ends > PEAK * np.maximum(near, middle))).any():
             return True
     return False
+
+
+@lru_cache(maxsize=16)
+def _parts(count: int) -> Array:
+    """The places at which so many variables are looked at, in parts of their ranges: (N, count)."""
+    if count < MANY:
+        return np.array(list(itertools.product(PLACES, repeat=count)))
+    places = np.full((1 + 2 * count, count), 0.5)
+    for variable in range(count):
+        places[1 + 2 * variable : 3 + 2 * variable, variable] = 0.0, 1.0
+    return places
 
 
 def _spread(low: Array, high: Array, part: Array) -> tuple[Array, Bools]:
