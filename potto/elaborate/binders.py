@@ -138,7 +138,7 @@ def _integral_over(
         body = body if density is ONE else scaled(elaboration, density, body)
         if run[0][1].discrete:
             ((name, part),) = run
-            body = sum_(name, *part.support, body)
+            body = sum_(name, *part.counted, body)
         else:
             bounds, hints = tuple(part.support for _, part in run), tuple(part.hints for _, part in run)
             body = elaboration.note(integral_term(tuple(name for name, _ in run), bounds, body, hints), node.span)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from functools import lru_cache
+from functools import lru_cache, partial, reduce
 
 from msgspec import Struct
 from msgspec.structs import replace
@@ -40,7 +40,10 @@ Tree = tuple[str, tuple["Tree | None", ...]]  # a measure and what it is given: 
 
 
 class Component(Struct, frozen=True):
-    """A part of a measure over one variable: its weight, and as in `Measure` support, hints and density."""
+    """A part of a measure over one variable: its weight, and as in `Measure` support, hints, density and reach.
+
+    filled: whether anything of it is left where it was truncated; None where nothing was cut off.
+    """
 
     weight: Term
     support: tuple[Term, Term]
@@ -48,6 +51,14 @@ class Component(Struct, frozen=True):
     density: Callable[[Term], Term]
     valid: tuple[Condition, ...]
     discrete: bool = False
+    reach: Callable[[Term], Term] | None = None
+    filled: Term | None = None
+
+    @property
+    def counted(self) -> tuple[Term, Term]:
+        """Of a discrete part, the first and the last number that a sum goes over."""
+        first, last = self.support
+        return (first, last) if self.reach is None else (first, _end("min", last, self.reach(first), INF))
 
 
 class Composition(Struct, frozen=True):
@@ -81,7 +92,9 @@ def _parts(tree: Tree, arguments: Iterator[Term]) -> tuple[Component, ...]:
     measure, terms = MEASURES[name], [term for term in given if isinstance(term, Term)]
     valid = tuple((condition, f"{name}: {why}") for condition, why in measure.valid(*terms))
     support, hints = measure.support(*terms), measure.hints(*terms)
-    return (Component(ONE, support, hints, lambda x: measure.density(x, *terms), valid, measure.discrete),)
+    far = measure.reach
+    reach = None if far is None else lambda first: far(first, *terms)
+    return (Component(ONE, support, hints, lambda x: measure.density(x, *terms), valid, measure.discrete, reach),)
 
 
 def discrete(shape: str) -> bool:
@@ -153,8 +166,7 @@ def _bounding(tree: Tree) -> Iterator[bool]:
     ends: frozenset[str] = frozenset()
     if name in MEASURES:
         names = MEASURES[name].parameters
-        lo, hi = MEASURES[name].support(*map(var, names))
-        ends = lo.free | hi.free
+        ends = frozenset().union(*(end.free for end in MEASURES[name].counted(*map(var, names))))
     for place, inner in enumerate(inside):
         if inner is not None:
             yield from _bounding(inner)
@@ -170,8 +182,14 @@ def _cut(part: Component, lo: Term, hi: Term) -> Component:
     if part.discrete:
         lo, hi = _whole("ceil", lo), _whole("floor", hi)
     inside = _end("max", low, lo, neg(INF)), _end("min", high, hi, INF)
-    holds = "le" if part.discrete else "lt"
-    return replace(part, support=inside, valid=(*part.valid, (prim(holds, *inside), "truncated: nothing is left")))
+    left = prim("le" if part.discrete else "lt", *inside)
+    return replace(part, support=inside, filled=left if part.filled is None else prim("and", part.filled, left))
+
+
+def _clipped(part: Component) -> Component:
+    """A continuous part of which nothing may be left: then its range has length zero instead of running backwards."""
+    lo, hi = part.support
+    return part if part.discrete else replace(part, support=(lo, _end("max", hi, lo, neg(INF))))
 
 
 def _whole(op: str, end: Term) -> Term:
@@ -192,10 +210,9 @@ def _end(op: str, own: Term, other: Term, nowhere: Term) -> Term:
 
 def _mass(part: Component) -> Term:
     """By the integral or the sum, not as a difference of the cdf, which has no digits in the upper tail."""
-    lo, hi = part.support
-    name = fresh("inside", lo.free | hi.free | part.density(ZERO).free)
+    name = fresh("inside", part.support[0].free | part.support[1].free | part.density(ZERO).free)
     if part.discrete:
-        return sum_(name, lo, hi, part.density(var(name)))
+        return sum_(name, *part.counted, part.density(var(name)))
     return integral((name,), (part.support,), part.density(var(name)), (part.hints,))
 
 
@@ -203,8 +220,12 @@ def _truncated(given: Sequence[Term | tuple[Component, ...]]) -> tuple[Component
     inner, lo, hi = given
     assert isinstance(inner, tuple) and isinstance(lo, Term) and isinstance(hi, Term)
     parts = [_cut(part, lo, hi) for part in inner]
+    filled = [part.filled for part in parts if part.filled is not None]
+    some = reduce(partial(prim, "or"), filled), "truncated: nothing is left"
+    if len(parts) > 1:
+        parts = [_clipped(part) for part in parts]
     left = add(*(mul(part.weight, _mass(part)) for part in parts))
-    return tuple(replace(part, weight=div(part.weight, left)) for part in parts)
+    return tuple(replace(part, weight=div(part.weight, left), valid=(*part.valid, some)) for part in parts)
 
 
 truncated = compose(

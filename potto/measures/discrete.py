@@ -1,13 +1,14 @@
 """Measures on whole numbers: bernoulli, binomial, poisson. An expectation is a sum of the terms in their support.
 
-Where there are infinitely many, the support ends where what lies beyond it has a chance below 1e-20: for a Poisson
+Where there are infinitely many, the sum ends where what lies beyond it has a chance below 1e-20: for a Poisson
 variable X with mean r, P(X >= r + t) <= exp(-t^2/(2 (r + t/3))) by Bennett's inequality, which is below exp(-46) for
-t = 10 sqrt(r) + 40. That is the truncation error, times what the body is there.
+t = 10 sqrt(r) + 40. That is the truncation error, times what the body is there. From a number a > r on the chances fall
+at least as fast as those of mean a do, r^k/k! = (r/a)^k a^k/k!: a truncated tail reaches as far as for a mean of a.
 """
 
 from __future__ import annotations
 
-from potto.core.terms import ONE, ZERO, Term, add, const, mul, neg, prim, sub
+from potto.core.terms import INF, ONE, ZERO, Term, add, const, mul, neg, prim, sub
 from potto.measures.registry import Condition, Measure, register
 
 SPREADS, MORE = const(10.0), const(40.0)
@@ -69,16 +70,25 @@ def _poisson_mass(k: Term, r: Term) -> Term:
     return prim("exp", sub(mul(k, prim("log", r)), add(r, _log_factorial(k))))
 
 
+def _poisson_reach(first: Term, r: Term) -> Term:
+    highest = r if first is ZERO else prim("max", first, r)
+    return prim("ceil", add(highest, mul(SPREADS, prim("sqrt", highest)), MORE))
+
+
 poisson = register(
     Measure(
         "poisson",
         parameters=("r",),
         discrete=True,
-        support=lambda r: (ZERO, prim("ceil", add(r, mul(SPREADS, prim("sqrt", r)), MORE))),
+        support=lambda r: (ZERO, INF),
+        reach=_poisson_reach,
         density=_poisson_mass,
         mean=lambda r: r,
         variance=lambda r: r,
-        valid=lambda r: ((prim("lt", ZERO, r), "the rate must be positive"),),
+        valid=lambda r: (
+            (prim("lt", ZERO, r), "the rate must be positive"),
+            (prim("lt", r, INF), "the rate must be finite"),
+        ),
         domain=((0.1, 50.0),),
         doc="How many events happen in a unit of time, r on average; summed up to r + 10*sqrt(r) + 40.",
         example="integral (k ~ poisson(3)) k^2 d(k)",

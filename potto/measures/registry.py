@@ -32,6 +32,8 @@ class Measure(Struct, frozen=True):
         depends on them. In ascending order.
     discrete: whether it is one of whole numbers: the support is the first and the last of them, the density the chance
         of each, and an expectation a sum.
+    reach: of a discrete measure with infinite support, from a number of it (before the parameters) where a sum that
+        begins there may end: what lies beyond has less than 1e-20 of the chance of what lies between.
     cdf: the integral of the density up to x; None if it is not a formula of builtins.
     quantile: the inverse of the cdf; None if it is not a formula of builtins.
     mean, variance: None where they do not exist.
@@ -51,8 +53,14 @@ class Measure(Struct, frozen=True):
     example: str
     hints: Callable[..., Terms] = field(default=_none)
     discrete: bool = False
+    reach: Callable[..., Term] | None = None
     cdf: Callable[..., Term] | None = None
     quantile: Callable[..., Term] | None = None
+
+    def counted(self, *parameters: Term) -> tuple[Term, Term]:
+        """Of a discrete measure, the first and the last number that a sum goes over."""
+        first, last = self.support(*parameters)
+        return first, last if self.reach is None else self.reach(first, *parameters)
 
 
 MEASURES: dict[str, Measure] = {}

@@ -94,6 +94,18 @@ def test_nothing_left(values: tuple[float, ...]) -> None:
         f(*values)
 
 
+def test_a_component_of_which_nothing_is_left() -> None:
+    """The others are what is left: uniform between 3/2 and t, with mean 3/4 + t/2; outside of all of them, nothing."""
+    f = potto.compile(
+        "def f(t) integral (x ~ truncated(mixture(1, uniform(0, 1), 1, uniform(2, 3)), 1.5, t)) x d(x)\n"
+    ).f
+    answer = potto.deriv(f)((2.5, 1.0))
+    assert abs(answer.value - 2.25) <= answer.error <= 1e-12
+    assert abs(answer.tangent - 0.5) <= answer.tangent_error <= 1e-12
+    with pytest.raises(potto.PottoError, match="nothing is left"):
+        f(1.75)
+
+
 @pytest.mark.parametrize(
     ("measure", "says"),
     [

@@ -51,6 +51,15 @@ def test_poisson(r: float) -> None:
         close(PROGRAM.d_square(r), 2 * mp.mpf(r) + 1)
 
 
+@pytest.mark.parametrize(("r", "first"), [(3.0, 60), (3.0, 100), (1e-3, 10)])
+def test_a_far_tail_of_poisson(r: float, first: int) -> None:
+    """All but nothing of the whole, but all that there is: the sum goes on from where it begins."""
+    f = potto.compile(f"def f(r) integral (k ~ truncated(poisson(r), {first}, inf)) k d(k)\n").f
+    with mp.workdps(40):
+        chances = [poisson(k, mp.mpf(r)) for k in range(first, first + 300)]
+        close(f(r), mp.fsum(k * p for k, p in enumerate(chances, first)) / mp.fsum(chances))
+
+
 def test_binomial() -> None:
     with mp.workdps(40):
 

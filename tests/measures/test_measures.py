@@ -43,7 +43,7 @@ def expectation(measure: Measure, values: tuple[float, ...], body: Term) -> mp.m
     parameters = tuple(map(const, values))
     density = measure.density(X, *parameters)
     if measure.discrete:
-        return evaluate(sum_("x", *measure.support(*parameters), mul(density, body)), {}, digits=20)
+        return evaluate(sum_("x", *measure.counted(*parameters), mul(density, body)), {}, digits=20)
     term = integral(("x",), (measure.support(*parameters),), mul(density, body), (measure.hints(*parameters),))
     return evaluate(term, {}, digits=15)
 

@@ -42,6 +42,12 @@ BELOW = "def step(u, w) [u > 0]*w\n"
             (1 - T**3) / 12,
             -(T**2) / 4,
         ),
+        # A surface that runs along both variables by turns, in a function that is passed: (t + 2)(t + 1).
+        (
+            "def g(h) integral ([-2, 2], [-1, 1]) h(x, y) d(x, y)\ndef f(t) g(\\(x, y) . [max(x, y) < t])",
+            (T + 2) * (T + 1),
+            2 * T + 3,
+        ),
         # In a sum: (n/2)^2 for n = 3, 2, 1 on [0, t/3], [t/3, t/2], [t/2, t].
         (
             "def f(t) integral [0, 1] (integral [0, 1] (sum k in 1..3 ([x < t/k]*y)) d(y))^2 d(x)",

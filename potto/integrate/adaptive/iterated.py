@@ -80,6 +80,13 @@ class Iteration(Struct):
         """By variable the degree of what is integrated: what crosses a face has speeds, which are not polynomials."""
         return self.plan.degrees if self.face is None else ()
 
+    @property
+    def reads(self) -> frozenset[str]:
+        """The names that what is integrated asks for: those of the integrand, and of the surface that a face lies on,
+        which may be what a function that is passed has captured."""
+        names = frozenset(self.plan.body.params)
+        return names if self.face is None else names.union(self.face.psi.params)
+
     def whole(self, env: dict[str, Value], batch: int) -> Sums:
         """The integrals of a batch over all variables, with what they could come to at most counted as added up."""
         self.extent = Extent(len(self.plan.levels), self.machine.directions, batch)

@@ -38,11 +38,11 @@ def paced(work: PanelBatch) -> Segments:
 
 def _held(work: PanelBatch, rows: Ints) -> Array:
     """What there is at each of the places, in proportion: the integrand times the distance, (S, places)."""
-    seg, machine, plan = work.seg.pick(rows), work.machine.with_directions(0), work.parent.plan
+    seg, machine = work.seg.pick(rows), work.machine.with_directions(0)
     up = (seg.kind == substitution.UP)[:, None]
     x = np.where(up, seg.a[:, None] + PLACES, seg.b[:, None] - PLACES)
     row = np.repeat(np.arange(rows.size), PLACES.size)
-    env = gather({n: still(v) for n, v in work.env.items() if n in plan.body.params}, seg.owner[row])
+    env = gather({n: still(v) for n, v in work.env.items() if n in work.parent.reads}, seg.owner[row])
     env[work.level.variable] = Cell(x.ravel())
     sides = {g: m[rows[row]] if isinstance(m, np.ndarray) else m for g, m in work.sides.items()}
     values, _ = work.parent.inside(work.number, env, x.size, sides, machine, work.below(seg.owner[row]))

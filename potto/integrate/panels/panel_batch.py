@@ -225,7 +225,7 @@ class PanelBatch(Struct, dict=True):
         owner = self.seg.owner[index]
         k, name = self.k, self.level.variable
         tangent: tuple[Number | None, ...] = (None,) * k + ((1.0,) if self.moving else ())
-        names = self.parent.plan.body.params if self.last else self.env
+        names = self.parent.reads if self.last else self.env
         here = {n: pad(v, self.inner.directions) for n, v in self.env.items() if n in names}
         if self.last:
             env = column(gather(here, owner))
@@ -342,7 +342,7 @@ class PanelBatch(Struct, dict=True):
 
     def standing(self, x: Array, owner: Ints) -> dict[str, Value]:
         """The environments of places of members, in which nothing moves."""
-        names = self.parent.plan.body.params if self.last else self.env
+        names = self.parent.reads if self.last else self.env
         here = gather({n: still(v) for n, v in self.env.items() if n in names}, owner)
         return {**here, self.level.variable: Cell(x)}
 
