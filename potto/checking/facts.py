@@ -15,7 +15,7 @@ from potto.calculus.checking.conditions import conditions_of
 from potto.calculus.checking.diffeo import exported
 from potto.calculus.decomposition.guards import unguarded
 from potto.calculus.explanation.bound_names import as_written
-from potto.calculus.explanation.explain import describe
+from potto.calculus.explanation.explain import describe, explain_derivative
 from potto.calculus.explanation.fields import fields_of
 from potto.calculus.explanation.layout import WIDTH, DerivativeText, IntegralText, Show, meets
 from potto.calculus.explanation.notation import Notation, numbers_of
@@ -161,7 +161,10 @@ def derivative_facts(db: Database, file: str, name: str) -> DerivativeFacts | No
     notation = Notation(fields_of(db, type), numbers_of(db, global_(file, name)))
     type = interface(db, file, name).type
     derived = format_type(derivative_type(type))
-    found = describe(term, name, derived, lambda g: core(db, g.module, g.name).term, notation)
+    if term is whole:
+        found = explain_derivative(db, file, name)
+    else:
+        found = describe(term, name, derived, lambda g: core(db, g.module, g.name).term, notation)
     return DerivativeFacts(
         name,
         format_type(type),

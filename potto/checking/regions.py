@@ -38,6 +38,7 @@ from potto.core.terms import (
     lam,
     postorder,
     proj,
+    stem,
     sub,
     substitute,
     transform,
@@ -124,7 +125,7 @@ def _outermost(db: Database, term: Term) -> tuple[tuple[str, ...], list[Integral
             found[node] = None
         elif isinstance(node, Sum | Array):
             low, high = (ZERO, sub(node.size, ONE)) if isinstance(node, Array) else (node.lo, node.hi)
-            written = node.variable.partition("'")[0]
+            written = stem(node.variable)
             name = around.setdefault((written, low, high), apart(written, {*params, *around.values()}))
             stack += [substitute(node.body, {node.variable: var(name)}), high, low]
         else:

@@ -17,13 +17,12 @@ from potto.core.terms import (
     Term,
     Var,
     array,
-    children,
     fold,
     integral,
     lam,
     postorder,
-    rebuild,
     sum_,
+    transform,
     var,
 )
 
@@ -35,10 +34,7 @@ def plainly_bound(term: Term) -> Term:
     names = names_of_copies(nodes)
     if not names:
         return term
-    found: dict[Term, Term] = {}
-    for node in nodes:
-        found[node] = renamed(rebuild(node, tuple(found[child] for child in children(node))), names)
-    return found[term]
+    return transform(term, lambda _, new: renamed(new, names))
 
 
 def names_of_copies(nodes: tuple[Term, ...]) -> Mapping[str, str]:

@@ -10,7 +10,7 @@ from __future__ import annotations
 from msgspec import Struct
 from msgspec.structs import replace
 
-from potto.core.terms import App, Deriv, Global, Lam, Term
+from potto.core.terms import App, Deriv, Global, Lam, Term, stem
 from potto.elaborate.values import Groups, Slot
 from potto.modules.texts import definition
 from potto.query import Database, query
@@ -91,11 +91,6 @@ def groups_of_term(db: Database, term: Term, named: bool = True) -> Groups:
             )
         case _:
             return ()
-
-
-def stem(name: str) -> str:
-    """A parameter's name as it was written: binders are made distinct by what stands behind a quote."""
-    return name.partition("'")[0]
 
 
 def dims_of_term(db: Database, term: Term) -> int | None:

@@ -64,8 +64,15 @@ def _call(name: str, args: list[ast.expr]) -> Term:
 # Values
 
 
-def value(term: Term, env: Mapping[str, Any]) -> Any:
-    """The value of a term by mpmath; nan where it is not real."""
+def value(term: Term, env: Mapping[str, Any], known: dict[Term, Any] | None = None) -> Any:
+    """The value of a term by mpmath; nan where it is not real. known: those of terms in the same environment."""
+    known = {} if known is None else known
+    if term not in known:
+        known[term] = _value(term, env, known)
+    return known[term]
+
+
+def _value(term: Term, env: Mapping[str, Any], known: dict[Term, Any]) -> Any:
     match term:
         case t.Const(name="pi"):
             return +mpmath.pi
@@ -74,19 +81,19 @@ def value(term: Term, env: Mapping[str, Any]) -> Any:
         case t.Var(name=name):
             return mpmath.mpf(env[name])
         case t.Branch():
-            surface = value(term.surface, env)
+            surface = value(term.surface, env, known)
             holds = surface > 0 if term.strict else surface >= 0
-            return value(term.then if holds else term.orelse, env)
+            return value(term.then if holds else term.orelse, env, known)
         case t.If():
-            return value(term.then if _truth(term.condition, env) else term.orelse, env)
+            return value(term.then if _truth(term.condition, env, known) else term.orelse, env, known)
         case t.Prim(op=op, args=args):
-            return _builtin(op, [value(a, env) for a in args])
+            return _builtin(op, [value(a, env, known) for a in args])
         case t.Proj(term=inner, index=index):
-            return value(inner, env)[index]
+            return value(inner, env, known)[index]
         case t.Tuple(items=items):
-            return tuple(value(i, env) for i in items)
+            return tuple(value(i, env, known) for i in items)
         case t.Sum():
-            lo, hi = int(value(term.lo, env)), int(value(term.hi, env))
+            lo, hi = int(value(term.lo, env, known)), int(value(term.hi, env, known))
             return mpmath.fsum(value(term.body, {**env, term.variable: i}) for i in range(lo, hi + 1))
         case t.Integral():
             return _integral(term.variables, term.bounds, term.body, env)
@@ -94,14 +101,14 @@ def value(term: Term, env: Mapping[str, Any]) -> Any:
             raise ValueError(type(term).__name__)
 
 
-def _truth(term: Term, env: Mapping[str, Any]) -> bool:
+def _truth(term: Term, env: Mapping[str, Any], known: dict[Term, Any]) -> bool:
     assert isinstance(term, t.Prim)
     if term.op in ("and", "or"):
-        left, right = (_truth(a, env) for a in term.args)
+        left, right = (_truth(a, env, known) for a in term.args)
         return (left and right) if term.op == "and" else (left or right)
     if term.op == "not":
-        return not _truth(term.args[0], env)
-    a, b = (value(x, env) for x in term.args)
+        return not _truth(term.args[0], env, known)
+    a, b = (value(x, env, known) for x in term.args)
     return bool({"lt": a < b, "le": a <= b, "eq": a == b, "ne": a != b}[term.op])
 
 
@@ -150,12 +157,12 @@ def _pieces(
         inner = [(n.variables[0], *n.bounds[0], n.body) for n in nested]
         if further:
             inner.append((further[0], *bounds[0], body))
-        counts = []
+        counts, values = [], dict[Term, Any]()
         for other, lo, hi, within in inner:
             if (lo.free | hi.free) <= here.keys():
-                ends = value(lo, here), value(hi, here)
+                ends = value(lo, here, values), value(hi, here, values)
                 counts.append(len(_pieces(other, *ends, within, here, 16)) if ends[0] != ends[1] else 0)
-        return (*(int(value(n.surface, here) > 0) for n in known), *counts)
+        return (*(int(value(n.surface, here, values) > 0) for n in known), *counts)
 
     grid = [a + (b - a) * mpmath.mpf(i) / count for i in range(count + 1)]
     middles = [(x + y) / 2 for x, y in itertools.pairwise(grid)]

@@ -38,11 +38,6 @@ class ValueRange(Struct, frozen=True):
     def negative(self) -> bool:
         return self.hi < 0 or (self.hi <= 0 and not self.zero)
 
-    @property
-    def infinite(self) -> bool:
-        """Whether no number is in it."""
-        return self.lo == math.inf or self.hi == -math.inf
-
 
 ANYTHING = ValueRange(-math.inf, math.inf)
 _POSITIVE = ValueRange(0.0, math.inf, False)

@@ -52,6 +52,7 @@ from potto.core.terms import (
     Integral,
     Term,
     postorder,
+    stem,
     substitute,
     var,
 )
@@ -218,7 +219,7 @@ def _products(
 def _readable(condition: Condition) -> Condition:
     """Copies of bound variables (x'1) under their own names, where those are free."""
     used = {n for c in condition.coordinates for n in c.free}
-    plain = {n: n.partition("'")[0] for n in used if "'" in n}
+    plain = {n: stem(n) for n in used if "'" in n}
     plain = {n: p for n, p in plain.items() if p not in used and list(plain.values()).count(p) == 1}
     if not plain:
         return condition

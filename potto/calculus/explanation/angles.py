@@ -10,6 +10,7 @@ from collections.abc import Callable
 from fractions import Fraction
 
 from potto.calculus.algebra.rational_form import normal
+from potto.calculus.explanation.brackets import constant
 from potto.calculus.explanation.factors import Factors
 from potto.calculus.explanation.products import written
 from potto.core.terms import ONE, PI, ZERO, Prim, Term, Var, add, const, div, mul, neg, pow_, prim, sub
@@ -29,7 +30,7 @@ def at_angle(node: Prim, integers: frozenset[str]) -> Term:
     """The sine, cosine or tangent of an angle without turns, and an angle that everybody knows as a part of pi;
     `integers`: variables that are whole numbers."""
     if node.op in _TABLE:
-        known = _fraction(node.args[0])
+        known = constant(node.args[0])
         part = None if known is None else _TABLE[node.op].get(known)
         return node if part is None else _of_pi(part)
     if node.op == "atan2":
@@ -131,7 +132,7 @@ _KNOWN: dict[tuple[str, str], Callable[[Term], Term]] = {
 
 def _direction(y: Term, x: Term) -> Term | None:
     """atan2 of numbers along an axis or a diagonal."""
-    a, b = _fraction(y), _fraction(x)
+    a, b = constant(y), constant(x)
     if a is None or b is None or (a == b == 0) or (a and b and abs(a) != abs(b)):
         return None
     if not a or not b:
@@ -146,13 +147,6 @@ def _of_pi(part: Fraction) -> Term:
         return ZERO
     whole = div(mul(const(float(abs(part.numerator))), PI), const(float(part.denominator)))
     return neg(whole) if part < 0 else whole
-
-
-def _fraction(term: Term) -> Fraction | None:
-    found = None if term.free else normal(term)
-    if found is None or not {*found.top, *found.below} <= {()}:
-        return None
-    return Fraction(found.top.get((), 0)) / Fraction(found.below[()])
 
 
 def length(node: Prim) -> Term:

@@ -13,7 +13,6 @@ from potto.core.terms import (
     Term,
     bound_names,
     children,
-    postorder,
     rebuild,
     rename_bound,
     stem,
@@ -42,19 +41,15 @@ def as_written(term: Term, around: frozenset[str] = frozenset()) -> Term:
     return transform(term, change, below=lambda node: () if isinstance(node, _Binder) else children(node))
 
 
-def named_alike(term: Term, around: frozenset[str] = frozenset()) -> Term:
+def named_alike(term: Term, around: frozenset[str]) -> Term:
     """The same, and integrals, sums and arrays that differ by the names of their variables are one; `around`: the names
     that none of them may have."""
-    return _one_of_each(as_written(term, around))
-
-
-def _one_of_each(term: Term) -> Term:
     known: dict[Term, Term] = {}
-    found: dict[Term, Term] = {}
-    for node in postorder(term):
-        new = rebuild(node, tuple(found[part] for part in children(node))) if children(node) else node
-        if isinstance(new, _Binder):
-            places = {name: f"bound'{place}" for place, name in enumerate(bound_names(new))}
-            new = known.setdefault(rename_bound(new, places), new)
-        found[node] = new
-    return found[term]
+
+    def change(_: Term, new: Term) -> Term:
+        if not isinstance(new, _Binder):
+            return new
+        places = {name: f"bound'{place}" for place, name in enumerate(bound_names(new))}
+        return known.setdefault(rename_bound(new, places), new)
+
+    return transform(as_written(term, around), change)

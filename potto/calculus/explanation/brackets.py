@@ -16,7 +16,7 @@ from math import gcd, isqrt, lcm
 from msgspec import Struct
 
 from potto.calculus.algebra.ranges import Box, range_of
-from potto.calculus.algebra.rational_form import as_term, normal
+from potto.calculus.algebra.rational_form import as_term, equal, normal
 from potto.calculus.explanation.squares import root_of_square
 from potto.core.polynomials import Polynomial, number, shared_by, without
 from potto.core.printer import format_term
@@ -202,13 +202,7 @@ def constant(term: Term) -> Fraction | None:
 
 def opposite(first: Inequality, second: Inequality) -> bool:
     """Whether one surface is above 0 where the other is below it."""
-    return first.strict and second.strict and _is_turned(first, second)
-
-
-def _is_turned(first: Inequality, second: Inequality) -> bool:
-    """Whether one surface is the other with its sign turned."""
-    found = normal(add(first.surface, second.surface))
-    return found is not None and not found.top
+    return first.strict and second.strict and equal(first.surface, neg(second.surface))
 
 
 def two_sides(term: Term) -> Term | None:
@@ -221,7 +215,7 @@ def two_sides(term: Term) -> Term | None:
         case _:
             return None
     match conditions(first), conditions(second):
-        case [one], [other] if _is_turned(one, other):
+        case [one], [other] if equal(one.surface, neg(other.surface)):
             return one.surface
         case _:
             return None

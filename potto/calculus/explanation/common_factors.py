@@ -32,11 +32,8 @@ def taken_out(
     if not (shared.powers or shared.exponents or shared.conditions or shared.coefficient != 1):
         return None
     rest = factored(simpler(add(*(written(part.without(shared), tangents) for part in parts))))
-    found = Factors(rest.coefficient * shared.coefficient, dict(shared.powers), [*shared.exponents, *rest.exponents],
-                    [*shared.conditions, *rest.conditions])  # fmt: skip
-    for base, exponent in rest.powers.items():
-        found.times(base, exponent)
-    return found
+    shared.times_all(rest)
+    return shared
 
 
 def _is_below_differently(base: Term, parts: Sequence[Factors]) -> bool:

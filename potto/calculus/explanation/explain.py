@@ -25,9 +25,9 @@ from potto.calculus.explanation.continuity import continuous
 from potto.calculus.explanation.divisors import divided_by
 from potto.calculus.explanation.fields import fields_of
 from potto.calculus.explanation.layout import DerivativeText, IntegralText, SurfaceText
-from potto.calculus.explanation.notation import Notation, Rewrite, notation_of, numbers_of
+from potto.calculus.explanation.notation import Notation, Rewrite, notation_of, written_notation
 from potto.calculus.explanation.plain_names import Each, apart, plainly_indexed, plainly_named
-from potto.calculus.explanation.readable import ReadableParts, readable
+from potto.calculus.explanation.readable import ReadableParts
 from potto.calculus.explanation.symbols import Formula, NoFormula, Words, over_functions, shorter
 from potto.calculus.inlining.expand import Resolve, heads_of
 from potto.calculus.solving.pivots import NoClosedForm, Roots, SurfaceRoot, pivots
@@ -36,7 +36,7 @@ from potto.calculus.surfaces.branch_assignment import box_of, branches_of, with_
 from potto.calculus.surfaces.branch_assignment import unguarded as where_it_exists
 from potto.calculus.surfaces.branch_cuts import opened
 from potto.calculus.surfaces.case_split import unnested
-from potto.core.simplify import normalized_surface, simplify
+from potto.core.simplify import normalized_surface
 from potto.core.terms import (
     ONE,
     ZERO,
@@ -50,7 +50,6 @@ from potto.core.terms import (
     Term,
     app,
     children,
-    global_,
     integral,
     lam,
     stem,
@@ -76,12 +75,11 @@ def explain_derivative(db: Database, file: str, name: str) -> DerivativeText:
     original = _original(term, name, resolve)
     if original is not None:
         of, shown = original
-        type, notation = found.type, Notation(numbers=numbers_of(db, global_(file, name)))
+        type, notation = found.type, written_notation(db, file, name)
         if isinstance(of, Global):
-            type = derivative_type(interface(db, of.module, of.name).type)
-            notation = Notation(fields_of(db, interface(db, of.module, of.name).type), notation.numbers)
-        whole = resolve(of) if isinstance(of, Global) else of
-        return replace(describe(whole, shown, format_type(type), resolve, notation, db.give_way), by=name)
+            own = interface(db, of.module, of.name).type
+            of, type, notation = resolve(of), derivative_type(own), Notation(fields_of(db, own), notation.numbers)
+        return replace(describe(of, shown, format_type(type), resolve, notation, db.give_way), by=name)
     type_text = format_type(derivative_type(found.type))
     return describe(_applied(term, found.type), name, type_text, resolve, notation_of(db, file, name), db.give_way)
 
@@ -354,7 +352,7 @@ def _root(root: SurfaceRoot, words: Words) -> str:
     index = root.index and apart(stem(root.index), (at.free | words.names | {root.variable}) - {root.index})
     if root.index and index:
         at = substitute(at, {root.index: var(index)})
-    text = words.notation.text(readable(simplify(words.notation.fields(at)), frozenset()))
+    text = words.notation.text(words.read(at))
     return f"{text} for integers {index}" if index else text
 
 

@@ -52,6 +52,15 @@ class Factors(Struct):
             if not self.powers[base]:
                 del self.powers[base]
 
+    def times_all(self, other: Factors, power: int = 1) -> None:
+        """All that another product has, to a power."""
+        if other.coefficient != 1:
+            self.coefficient *= other.coefficient**power
+        for base, exponent in other.powers.items():
+            self.times(base, exponent * power)
+        self.exponents += [mul(const(float(power)), exponent) for exponent in other.exponents]
+        self.conditions += other.conditions
+
     def shared_with(self, other: Factors) -> Factors:
         """What both are products of, but for numbers."""
         found = Factors(Fraction(1), {}, [], [c for c in self.conditions if c in other.conditions])

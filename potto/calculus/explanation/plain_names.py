@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Container, Iterable, Mapping
 
-from potto.core.terms import Integral, Term, Var, integral, substitute, var
+from potto.core.terms import Integral, Term, Var, rename_bound, stem, substitute, var
 
 Each = tuple[str, Term, Term]  # an index, from, to
 
@@ -17,15 +17,12 @@ def plainly_named(node: Integral, params: Iterable[str]) -> Integral:
     taken = {*params, *(name for name in node.variables if "'" not in name)}
     new: dict[str, str] = {}
     for name in node.variables:
-        base = name.partition("'")[0]
-        if base != name:
-            base = apart(base, taken)
-            taken.add(base)
-        new[name] = base
-    terms = {name: var(plain) for name, plain in new.items()}
-    bounds = tuple((substitute(low, terms), substitute(high, terms)) for low, high in node.bounds)
-    found = integral(tuple(new.values()), bounds, substitute(node.body, terms))
-    return found if isinstance(found, Integral) else node
+        if stem(name) != name:
+            new[name] = apart(stem(name), taken)
+            taken.add(new[name])
+    found = rename_bound(node, new)
+    assert isinstance(found, Integral), "names alone are others"
+    return found
 
 
 def plainly_indexed(node: Integral, around: Iterable[Each], params: Iterable[str]) -> tuple[Integral, tuple[Each, ...]]:
@@ -35,7 +32,7 @@ def plainly_indexed(node: Integral, around: Iterable[Each], params: Iterable[str
     new: dict[str, Term] = {}
     for name, _, _ in around:
         if "'" in name:
-            plain = apart(name.partition("'")[0], taken)
+            plain = apart(stem(name), taken)
             taken.add(plain)
             new[name] = var(plain)
     found = substitute(node, new)

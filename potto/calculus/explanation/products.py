@@ -58,10 +58,7 @@ def _tidied(known: Factors) -> Factors:
     for base, exponent in list(found.powers.items()):
         if exponent.denominator == 1 and (decided := _where(found.conditions, base)) is not None:
             found.times(base, -exponent)
-            there = factored(decided)
-            found.coefficient *= there.coefficient ** int(exponent)
-            for factor, n in there.powers.items():
-                found.times(factor, n * exponent)
+            found.times_all(factored(decided), int(exponent))
             continue
         if isinstance(base, Const) and base.name is None and exponent.denominator == 2:
             value = Fraction(base.value)  # sqrt(2)/2 is 1/sqrt(2)

@@ -15,7 +15,7 @@ from math import gcd, inf, isfinite, lcm
 from msgspec import Struct
 
 from potto.calculus.algebra.ranges import Box, range_of
-from potto.calculus.algebra.rational_form import Rational, normal
+from potto.calculus.algebra.rational_form import Rational, equal, normal
 from potto.calculus.explanation.alternatives import in_one, sums_of_choices
 from potto.calculus.explanation.angles import at_angle, length
 from potto.calculus.explanation.brackets import Inequality, between, conditions, fewer
@@ -238,11 +238,7 @@ class _Work:
             if inner is None or (exponent < 0 and inner.conditions):
                 found.times(base, exponent)
                 continue
-            found.coefficient *= inner.coefficient ** int(exponent)
-            found.exponents += [mul(const(float(exponent)), each) for each in inner.exponents]
-            found.conditions += inner.conditions
-            for factor, n in inner.powers.items():
-                found.times(factor, n * exponent)
+            found.times_all(inner, int(exponent))
         return written(found, self.tangents)
 
     def _product_of(self, base: Term) -> Factors | None:
@@ -296,9 +292,9 @@ class _Work:
             if not isinstance(part, Prim) or part.op != "add" or not part.free.isdisjoint(self.tangents):
                 return part
             for name, known in names:
-                if _sums_to_zero(part, neg(known)):
+                if equal(part, known):
                     return var(name)
-                if _sums_to_zero(part, known):
+                if equal(part, neg(known)):
                     return neg(var(name))
             names.append((f"{_SUM}{len(names)}", part))
             return var(names[-1][0])
@@ -329,13 +325,7 @@ class _Work:
         found = Factors(coefficient, {}, [], [])
         for monomial, sign in monomials:
             for base, n in monomial:
-                part = self._factored(base)
-                for inner, power in part.powers.items():
-                    found.times(inner, power * n * sign)
-                if part.coefficient != 1:
-                    found.coefficient *= part.coefficient ** (n * sign)
-                found.exponents += [mul(const(float(n * sign)), e) for e in part.exponents]
-                found.conditions += part.conditions
+                found.times_all(self._factored(base), n * sign)
         return written(found, self.tangents)
 
     def _factored(self, base: Term) -> Factors:
@@ -380,11 +370,6 @@ class _Work:
 
     def _sum(self, form: Polynomial) -> Term:
         return added([self._product(Fraction(c), (m, 1)) for m, c in form.items()])
-
-
-def _sums_to_zero(first: Term, second: Term) -> bool:
-    found = normal(add(first, second))
-    return found is not None and not found.top
 
 
 def _is_endless(bound: Term) -> bool:

@@ -94,8 +94,5 @@ def _sign(
     found = Factors(first.coefficient, dict(first.powers), list(first.exponents), kept)
     positive, turned = (one[0].surface, 1) if not is_negative(one[0].surface) else (other[0].surface, -1)
     found.coefficient *= turned
-    signs = factored(sign_of_product(prim("sign", simpler(positive))))
-    found.coefficient *= signs.coefficient
-    for base, n in signs.powers.items():
-        found.times(base, n)
+    found.times_all(factored(sign_of_product(prim("sign", simpler(positive)))))
     return written(factored(written(found, tangents)), tangents)

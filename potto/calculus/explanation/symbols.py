@@ -103,7 +103,7 @@ class Words(Struct, frozen=True):
     def formula(self, term: Term, *inside: str, box: Box | None = None) -> Formula:
         """The same with the terms that it is written from."""
         found = guarded(self._readable(term, inside, box), box)
-        meant = {name: self._root(term) for name, term in self.roots.used_in(found)}
+        meant = {name: self.read(term) for name, term in self.roots.used_in(found)}
         named = "; ".join(f"{name} = {self._written(term)}" for name, term in meant.items())
         text = f"let {named} in {self._written(found)}" if meant else self._written(found)
         return Formula(text, (found, *meant.values()))
@@ -112,7 +112,8 @@ class Words(Struct, frozen=True):
         """The same of what stands under an integral, `inside` of its variables too: its brackets guard it there."""
         return self._written(self._readable(term, inside, box))
 
-    def _root(self, term: Term) -> Term:
+    def read(self, term: Term) -> Term:
+        """A term in which nothing moves, simplified; parts of records by their names."""
         return readable(simplify(self.notation.fields(term)), frozenset())
 
     def _readable(self, term: Term, inside: tuple[str, ...], box: Box | None) -> Term:

@@ -194,7 +194,7 @@ def _pixels(node: Sum) -> Lattice | None:
         read = _beside(other, "tent")
         near, far = read(apply("max", cell, ZERO)), read(apply("min", add(cell, ONE), last))
         # In a cell at the edge both are one element; read twice, it would seem to be two, and their difference to move.
-        ends = _inside_of(cell, ZERO, last)
+        ends = _inside_of(cell, last)
         return add(near, mul(ends, sub(place, cell), sub(far, near)))
 
     return at.args[0], cells, lambda cell: cell, last, look
@@ -236,16 +236,15 @@ def _table(node: Sum) -> Lattice | None:
             return if_(prim("lt", last, ZERO), otherwise, found)
 
         done = div(sub(place, read(end(1, inner))), read(sub(end(2, inner), end(1, inner)), ONE))
-        walked = mul(_inside_of(cell, ZERO, behind), add(mul(read(rise(inner)), done), read(slope(inner))))
+        walked = mul(_inside_of(cell, behind), add(mul(read(rise(inner)), done), read(slope(inner))))
         return add(_behind(rise, cell, behind), walked)
 
     return way.args[0], cells, border, behind, look
 
 
-def _inside_of(cell: Term, first: Term, end: Term) -> Term:
-    """1 for the cells from the first one on and before the end, 0 for others: as a factor, so that surfaces are one for
-    all cells."""
-    return if_(prim("lt", cell, first), ZERO, if_(prim("lt", cell, end), ONE, ZERO))
+def _inside_of(cell: Term, end: Term) -> Term:
+    """1 for the cells before the end, 0 for others: as a factor, so that surfaces are one for all cells."""
+    return if_(prim("lt", cell, ZERO), ZERO, if_(prim("lt", cell, end), ONE, ZERO))
 
 
 def _behind(rise: Callable[[Term], Term], cell: Term, last: Term) -> Term:

@@ -56,7 +56,6 @@ class Failure(Struct, frozen=True):
     reason: str
     singular: bool = False
     determinant: Term | None = None
-    combination: str = ""
 
 
 def jacobian(coordinates: Sequence[Term], variables: Sequence[str]) -> tuple[tuple[Term, ...], ...]:
@@ -71,7 +70,7 @@ def invert(coordinates: Sequence[Term], variables: Sequence[str], selected: bool
     """
     det = tidy(determinant(jacobian(coordinates, variables)))
     if is_zero(det):
-        return Failure("its determinant is 0 everywhere", True, ZERO, dependence(coordinates, variables))
+        return Failure("its determinant is 0 everywhere", True, ZERO)
     taken = {n for c in coordinates for n in c.free} | set(variables)
     values: list[str] = []
     for wish in _names(len(coordinates)):

@@ -113,9 +113,10 @@ def side_of(slope: Term, then: Term, orelse: Term, box: Box = NOWHERE) -> Term:
     return then if bounds.lo >= 0 else branch((slope,), True, then, orelse)
 
 
-def box_of(node: Integral) -> dict[str, tuple[float, float]]:
-    """The bounds of the variables of integration, as far as the form of the bounds shows them."""
-    box: dict[str, tuple[float, float]] = {}
+def box_of(node: Integral, outer: Box = NOWHERE) -> dict[str, tuple[float, float]]:
+    """The bounds of the variables of integration, as far as the form of the bounds shows them, and what is known around
+    it."""
+    box = dict(outer)
     for name, (lo, hi) in zip(node.variables, node.bounds, strict=True):
         a, b = range_of(lo, box), range_of(hi, box)
         box[name] = min(a.lo, b.lo), max(a.hi, b.hi)

@@ -45,6 +45,7 @@ from potto.core.terms import (
     postorder,
     proj,
     rebuild,
+    transform,
     with_integrand,
 )
 
@@ -90,13 +91,11 @@ def _of_integral(
     names = names.union(term.variables)
     forms = Forms(names, number)
     region, ordered = region_of(term, forms, outer)
-    memo: dict[Term, Term] = {}
-    for node in postorder(term.body, below=lambda node: () if isinstance(node, Integral) else children(node)):
-        if isinstance(node, Integral):
-            memo[node] = _of_integral(node, region, names, number, few, premises)
-        else:
-            memo[node] = rebuild(node, tuple(memo[c] for c in children(node)))
-    body = memo[term.body]
+
+    def change(node: Term, new: Term) -> Term:
+        return _of_integral(node, region, names, number, few, premises) if isinstance(node, Integral) else new
+
+    body = transform(term.body, change, below=lambda node: () if isinstance(node, Integral) else children(node))
     if any(nested(c) for node in outside(body, (Integral,)) for c in coordinates_of(node)):
         brackets = sum(isinstance(node, Branch) for node in outside(body, (Integral,)))
         trees = _Trees(body, forms, region, *((brackets, LOOKS * brackets) if few else (MOST_CASES, math.inf)))
@@ -147,14 +146,12 @@ class _Trees:
         met = [self.inner.intersection(outside(root, BINDERS)) for root in roots]
         if sum(map(len, met)) > len(set().union(*met)) or any(isinstance(root, Delta) for root in roots):
             return self.write(self.tree(body))  # they are decided together
-        memo: dict[Term, Term] = {root: self.write(self.tree(root)) for root in roots}
-        order = postorder(body, below=lambda node: () if node in memo or isinstance(node, BINDERS) else children(node))
-        for node in order:
-            if isinstance(node, BINDERS):
-                memo[node] = node
-            elif node not in memo:
-                memo[node] = rebuild(node, tuple(memo[c] for c in children(node)))
-        return memo[body]
+        known = {root: self.write(self.tree(root)) for root in roots}
+
+        def below(node: Term) -> Sequence[Term]:
+            return () if node in known or isinstance(node, BINDERS) else children(node)
+
+        return transform(body, lambda node, new: known.get(node, new), below)
 
     def nests(self, node: Term) -> bool:
         return any(nested(c) for c in coordinates_of(node))
