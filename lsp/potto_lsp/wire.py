@@ -104,10 +104,6 @@ class Encoded:
     def __init__(self, pieces: Iterable[bytes]) -> None:
         self.pieces = [piece for piece in pieces if piece]
 
-    def decoded(self) -> Any:
-        """The list."""
-        return json.loads(b"[%b]" % b",".join(self.pieces))
-
 
 def framed(message: dict[str, Any]) -> bytes:
     """A message as it is sent."""

@@ -129,7 +129,7 @@ class Answers:
         svg = integral_svg(shot.view, dark=bool(asked.get("dark")))
         seconds = time.perf_counter() - start
         return {
-            "svg": svg, "numbers": msgspec.to_builtins(shot.numbers), "told": told(shot.view, shot.numbers, wrt),
+            "svg": svg, "numbers": msgspec.to_builtins(shot.numbers), "told": told(shot.numbers, wrt),
             "surfaces": _surfaces(shot), "remarks": remarks(shot.view), "indices": shot.indices, "seconds": seconds,
             "slow": seconds > FRAME,
         }  # fmt: skip

@@ -98,7 +98,7 @@ def integral_svg(view: IntegralView, said: Sequence[Said] = (), dark: bool = Fal
 def words(view: IntegralView, numbers: IntegralNumbers | None, title: str, wrt: str) -> list[Said]:
     """What stands above and below a picture."""
     found: list[Said] = [(title, "")]
-    for name, text in told(view, numbers, wrt):
+    for name, text in told(numbers, wrt):
         found.append((f"{'   ' * (name in ('interior', 'boundary'))}{name} {text}", "quiet" if "diff" in name else ""))
     if numbers is not None and not numbers.converged:
         found.append(("not as accurate as was asked", "loss"))
@@ -108,7 +108,7 @@ def words(view: IntegralView, numbers: IntegralNumbers | None, title: str, wrt: 
     return [*found, *((text, "quiet") for text in remarks(view))]
 
 
-def told(view: IntegralView, numbers: IntegralNumbers | None, wrt: str) -> list[tuple[str, str]]:
+def told(numbers: IntegralNumbers | None, wrt: str) -> list[tuple[str, str]]:
     """The numbers with their names and errors; `…` for one that is not there yet."""
 
     def with_error(value: float, error: float) -> str:

@@ -1,19 +1,19 @@
 """Arrays that belong together: the last axis of each is one batch.
 
-Owns `side_by_side`, `distinct`, `places_of`, and `Columns`, by which sums, panels, segments and places are picked from,
-put in place and joined.
+Owns `side_by_side`, `distinct`, `patterns_of`, `places_of`, and `Columns`, by which sums, panels, segments and places
+are picked from, put in place and joined.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from copy import copy
 from typing import Any, Self, TypeVar
 
 import numpy as np
 from msgspec import Struct
 
-from potto.kernels.cells import Array, Ints
+from potto.kernels.cells import Array, Bools, Ints
 
 C = TypeVar("C", bound="Columns")
 FEW = 64  # numbers, up to which they are sorted in no time
@@ -90,6 +90,13 @@ def distinct(numbers: Any) -> Any:
         if most - least < numbers.size:
             return np.bincount(numbers.reshape(-1) - least).nonzero()[0] + least
     return np.unique(numbers, return_index=True)[0]
+
+
+def patterns_of(masks: Bools, index: Ints) -> Iterator[tuple[Bools, Ints]]:
+    """What masks (n, B) have at some members: each pattern that there is, (n,), with the members that have it."""
+    here = masks[:, index]
+    for pattern in np.unique(here, axis=1).T if index.size else ():
+        yield pattern, index[(here == pattern[:, None]).all(axis=0)]
 
 
 def places_of(known: Any, numbers: Any) -> Ints:

@@ -300,6 +300,13 @@ def undefined(where: str, surface: Term) -> Shortfall:
     )
 
 
+def mask_of(members: Members, size: int) -> Bools:
+    """Members of a batch of this size as a mask; nobody knows which: all of them."""
+    mask = np.full(size, members is None)
+    mask[[] if members is None else members] = True
+    return mask
+
+
 class Events:
     """What was met, and by which members of the batch."""
 
@@ -344,7 +351,7 @@ class Events:
         mask = np.zeros(size, dtype=bool)
         for event, members in self:
             if isinstance(event, kinds or Event):
-                mask[slice(None) if members is None else members] = True
+                mask |= mask_of(members, size)
         return mask
 
     def uncounted(self, size: int) -> Bools:

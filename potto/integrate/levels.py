@@ -52,6 +52,11 @@ class LevelPlan(Struct, frozen=True, dict=True):
     def variable(self) -> str:
         return self.level.variable
 
+    def decides(self, cut: int) -> bool:
+        """Whether what is integrated jumps at a candidate cut of this number, which is below 0 where it is none of a
+        surface."""
+        return cut >= 0 and self.level.cuts[cut].decides
+
     @cached_property
     def peaks(self) -> bool:
         """Whether it is known of places at which the integrand may be concentrated."""

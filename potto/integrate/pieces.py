@@ -353,13 +353,25 @@ def numbers_at(function: Lam, machine: Evaluator, env: Mapping[str, Value]) -> t
     return values  # type: ignore[return-value]
 
 
+def box_of_numbers(env: Mapping[str, Value]) -> dict[str, tuple[float, float]]:
+    """The numbers of an environment of one member, as ranges of one number each."""
+    numbers = {name: float(np.ravel(value.v)[0]) for name, value in env.items() if isinstance(value, Cell)}
+    return {name: (number, number) for name, number in numbers.items()}
+
+
 def still(value: Value) -> Value:
     """The value with its tangents and errors left out."""
     return map_cells(value, lambda cell: Cell(cell.v))
 
 
-def take(mask: Mask, index: Ints) -> Mask:
-    return mask[index] if isinstance(mask, np.ndarray) else mask
+def resting(value: Value) -> Value:
+    """The value with its tangents left out."""
+    return map_cells(value, lambda cell: Cell(cell.v, cell.e))
+
+
+def take(sides: Mapping[int, Mask], index: Ints) -> dict[int, Mask]:
+    """The sides of some members, or segments."""
+    return {group: mask[index] if isinstance(mask, np.ndarray) else mask for group, mask in sides.items()}
 
 
 def dense(value: Value, k: int, shape: tuple[int, ...]) -> tuple[Array, Array | None]:

@@ -290,6 +290,12 @@ def all_arrays(value: Value) -> list[Array]:
     return [a for item in items for a in all_arrays(item)]
 
 
+def batch_shape(values: Iterable[Value], *others: tuple[int, ...]) -> tuple[int, ...]:
+    """The shape of all that is evaluated at once: of every batch in some values, and other shapes."""
+    shapes = [*others, *(array.shape for value in values for array in all_arrays(value))]
+    return np.broadcast_shapes(*shapes) if shapes else ()
+
+
 def combined(change: Callable[..., Number], *values: Value) -> Value:
     """Values of one kind as one, part by part: the numbers, their errors, the tangents and theirs.
 

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 BAD_SETTING = declare("P0520", "a setting that does not exist or cannot have this value")
 
 Method = Literal["auto", "quadrature", "mc", "qmc"]
+SAMPLERS = ("mc", "qmc")  # whose errors are no less for one summand than for many
 METHODS: tuple[str, ...] = get_args(Method)
 Backend = Literal["auto", "numpy", "native"]
 BACKENDS: tuple[str, ...] = get_args(Backend)
@@ -33,7 +34,7 @@ CHOICES = {"method": METHODS, "backend": BACKENDS}
 
 # The relative accuracy that samples are held against where nobody asked for another one: an error of 4 standard errors
 # of 10,000 samples of a condition that holds half of the time is 4 % of the answer.
-SAMPLED = 0.05
+SAMPLED_RTOL = 0.05
 
 
 class Unasked(float):
@@ -45,8 +46,8 @@ class Settings(Struct, frozen=True):
 
     method: how integrals are estimated; "auto" cuts and integrates by quadrature where the dimension allows it.
     rtol, atol: the accuracy asked for; an estimate converged when its error is within `max(atol, rtol * |value|)`.
-    Where nobody asked, `mc` and `qmc` are held against SAMPLED, which is within the reach of `samples`. What cancels to
-    0 has converged when its error is within 1e-12 of what cancels (`runtime/answers/allowances.py`).
+    Where nobody asked, `mc` and `qmc` are held against SAMPLED_RTOL, which is within the reach of `samples`. What
+    cancels to 0 has converged when its error is within 1e-12 of what cancels (`runtime/answers/allowances.py`).
     samples: points of a Monte Carlo estimate.
     seed: where its random numbers start; equal seeds give equal answers.
     max_evals: the most evaluations of an integrand before the answer comes as it is, marked as not converged.
@@ -61,10 +62,15 @@ class Settings(Struct, frozen=True):
     max_evals: int = 20_000_000
     backend: Backend = "auto"
 
+    @property
+    def sampled(self) -> bool:
+        """Whether samples are asked for."""
+        return self.method in SAMPLERS
+
     def asked(self, drawn: bool) -> float:
         """The relative accuracy that an answer is held against; `drawn` if it is made of samples."""
-        if drawn and self.method in ("mc", "qmc") and isinstance(self.rtol, Unasked):
-            return SAMPLED
+        if drawn and self.sampled and isinstance(self.rtol, Unasked):
+            return SAMPLED_RTOL
         return self.rtol
 
 

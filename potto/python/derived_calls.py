@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from msgspec.structs import asdict, replace
 
+from potto.integrate.pieces import resting
 from potto.kernels.cells import Cell, Value, all_cells, map_cells, pad
 from potto.kernels.chunks import POINTS
 from potto.kernels.errors import wrong_call
@@ -85,7 +86,7 @@ class DerivedCall:
         def swept_back(value: Value, seeds: Sequence[Node]) -> Value:
             must_match(value, weights)
             pairs = zip(all_cells(value), (weight.v for weight in all_cells(weights)), strict=True)
-            return map_cells(value, lambda cell: Cell(cell.v, cell.e)), Cell(0.0, None, *_swept(list(pairs), seeds))
+            return resting(value), Cell(0.0, None, *_swept(list(pairs), seeds))
 
         def forward(value: Value) -> Value:
             must_match(value, weights)

@@ -243,18 +243,10 @@ class Database(Engine):
 
         `names` limits the search to these queries.
         """
-        return self._forget(lambda memo: predicate(memo.query.name, memo.args), names)
-
-    def forget_unused(self, revisions: int, durability: int = 0) -> int:
-        """Drop the memos up to this durability that nobody has asked for in the last `revisions` revisions."""
-        before = self.revision - revisions
-        return self._forget(lambda memo: memo.verified_at < before and memo.durability <= durability)
-
-    def _forget(self, predicate: Callable[[Memo], bool], names: Container[str] | None = None) -> int:
         with self.evaluating():
             self._forbid_in_queries("forget")
-            tables = [table for query, table in self._memos.items() if names is None or query.name in names]
-            return sum(drop(table, [memo for memo in table.values() if predicate(memo)]) for table in tables)
+            tables = [(query.name, t) for query, t in self._memos.items() if names is None or query.name in names]
+            return sum(drop(t, [memo for memo in t.values() if predicate(name, memo.args)]) for name, t in tables)
 
     def _evict(self) -> None:
         """Shrink the tables of queries that declare `keep`. Runs only between evaluations, when no memo is in use.

@@ -21,7 +21,7 @@ from potto.integrate.events import BOUNDLESS, INFINITE, NO_VALUE, NOT_A_NUMBER, 
 from potto.kernels import errors
 from potto.kernels.cells import Cell, Number, Rows, Value, all_cells
 from potto.kernels.making import counts
-from potto.projects.settings import DEFAULTS, Settings
+from potto.projects.settings import DEFAULTS, SAMPLERS, Settings
 from potto.runtime.answers.convergence import (
     Shortfalls,
     converged_members,
@@ -276,7 +276,7 @@ def _missing(numbers: list[tuple[Any, Any]], slopes: list[tuple[Any, Any]], mach
     record, settings = machine.record, machine.settings
     reasons = {**record.shortfalls, **{why: True for why, _ in machine.events.every(Shortfall)}}
     before = dict(reasons)
-    drawn = not record.methods.isdisjoint(("mc", "qmc"))
+    drawn = not record.methods.isdisjoint(SAMPLERS)
     every = ((pair, why) for why, pairs in ((BOUNDLESS, numbers), (STEEP, slopes)) for pair in pairs)
     for (number, error), infinite in every:
         found = missed(number, error, record.allowed, settings, drawn)

@@ -199,10 +199,10 @@ def rebuild(type: Type, leaf: Callable[[Type], Type]) -> Type:
     return shifted(rebuild(type.base, leaf), type.offset) if isinstance(type, Shifted) else leaf(type)
 
 
-def leaves(type: Type, limit: int = MAX_LEAVES) -> int:
-    """How many numbers a type is made of, counted up to `limit`."""
+def leaves(type: Type) -> int:
+    """How many numbers a type is made of, counted up to MAX_LEAVES."""
     count, stack = 0, [type]
-    while stack and count < limit:
+    while stack and count < MAX_LEAVES:
         part = resolve(stack.pop())
         below = parts(part)
         count += not below and not isinstance(part, SIZES)

@@ -582,16 +582,6 @@ def test_what_is_forgotten_runs_again_and_its_readers_stand() -> None:
     assert total(db, "a") == 6
 
 
-def test_what_nobody_asks_for_can_be_dropped() -> None:
-    db = Database()
-    for turn in range(20):
-        put(db, f"t{turn}", "x")
-        put(db, f"t{turn}", "xx")
-        assert total(db, f"t{turn}") == 2
-    assert db.forget_unused(revisions=5) == 3 * 14
-    assert total(db, "t0") == 2
-
-
 def test_the_log_can_be_printed(monkeypatch, capsys) -> None:
     monkeypatch.setenv("POTTO_LOG", "query")
     db = Database()

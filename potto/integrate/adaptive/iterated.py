@@ -119,7 +119,7 @@ class Iteration(Struct):
             machine.costs.stretches(seg.a.size, seg.a.size if keep is None else keep.size)
         here, sides = seg, settled.sides
         if keep is not None:
-            here, sides = seg.pick(keep), {g: take(m, keep) for g, m in sides.items()}
+            here, sides = seg.pick(keep), take(sides, keep)
         moving = cuts.moving and machine.directions > 0
         work = PanelBatch(self, number, level, env, here, sides, machine, moving, batch, root, slack,
                           cuts.conflict, cuts.paired, cuts.rested)  # fmt: skip
@@ -153,7 +153,7 @@ class Iteration(Struct):
         left_out = pulled_in(self.plan, work.number, work.env, seg, work.batch)
         if left_out is None:
             return
-        sides = {g: take(m, rows) for g, m in work.sides.items()}
+        sides = take(work.sides, rows)
         again = integrated(PanelBatch(
             self, work.number, work.level, work.env, seg, sides, work.machine, work.moving, work.batch, work.root,
             work.slack, work.conflict, work.paired, work.rested,
@@ -278,7 +278,7 @@ class Iteration(Struct):
     def sides_of(self, scene: IteratedVariable, seg: Segments) -> Settled:
         """The sides of all surfaces decided so far: those of this variable from the segments' middles."""
         level = scene.level
-        sides = {g: take(mask, seg.owner) for g, mask in scene.sides.items()}
+        sides = take(scene.sides, seg.owner)
         if not level.decided:
             return Settled(sides)
         unsure: dict[int, Bools] = {}

@@ -14,10 +14,10 @@ from potto.core.terms import function_of, tuple_
 from potto.integrate.columns import distinct
 from potto.integrate.decomposition.meetings import SEARCHED, Row, as_array, tangents
 from potto.integrate.events import at_a_fold, root_on_a_bound
-from potto.integrate.pieces import Evaluator, Sums, components, gather, numbers_at, take
+from potto.integrate.pieces import Evaluator, Sums, components, gather, numbers_at, resting, take
 from potto.integrate.plan import Plan
 from potto.integrate.rules.gauss import EPS
-from potto.kernels.cells import Array, Bools, Cell, Ints, Mask, Value, map_cells
+from potto.kernels.cells import Array, Bools, Cell, Ints, Mask, Value
 
 CLEAR = 64.0  # times what the rounding of a surface and of its place comes to; where it is larger it jumps
 
@@ -41,7 +41,7 @@ def over_roots(
     counts, folded = _roots(over, here, machine)
     inside = (root_x > low[owner]) & (root_x < high[owner]) & counts
     unsure = counts & ((np.abs(root_x - low[owner]) <= off) | (np.abs(root_x - high[owner]) <= off))
-    trace = plan.trace({g: take(m, owner) for g, m in sides.items()})
+    trace = plan.trace(take(sides, owner))
     value = machine.tracking().evaluate(plan.body, here, trace)
     sums = _added(components(value), owner, inside, unsure, batch, k)
     sums.v *= np.where(as_array(hi.v, batch) < as_array(lo.v, batch), -1.0, 1.0)
@@ -85,15 +85,11 @@ def _roots(over: LevelSet, here: dict[str, Value], machine: Evaluator) -> tuple[
     """Which places are roots, and not poles or jumps; and where the level set folds, as far as rounding tells."""
     face = function_of(tuple_((over.surface, partial(over.surface, over.shares[0]))))
     still = machine.with_directions(0).tracking()
-    found = numbers_at(face, still, {n: _without_tangents(here[n]) for n in face.params})
+    found = numbers_at(face, still, {n: resting(here[n]) for n in face.params})
     (value, off), (slope, rounding) = ((cell.v, 0.0 if cell.e is None else cell.e) for cell in found)
     size = np.asarray(here[over.shares[0]].v).shape  # type: ignore[union-attr]
     zero = np.isfinite(value) & ~(np.abs(value) > CLEAR * off)
     return np.broadcast_to(zero, size), np.broadcast_to(np.abs(slope) <= rounding, size)
-
-
-def _without_tangents(value: Value) -> Value:
-    return map_cells(value, lambda cell: Cell(cell.v, cell.e))
 
 
 def _added(cells: list[Cell], owner: Ints, inside: Bools, unsure: Bools, batch: int, k: int) -> Sums:

@@ -185,7 +185,7 @@ def on_bounds(
     for number, row in enumerate(rows):
         x = roots[number]
         most = _one_place(ends[0][0], ends[1][0], x)
-        for bound, speed, e in ends if row.cut >= 0 and plan.level.cuts[row.cut].decides else ():
+        for bound, speed, e in ends if plan.decides(row.cut) else ():
             near = np.clip(off[number] + e, NARROW * np.abs(bound), most)
             near = (np.abs(x - bound) <= near) & (x != bound) & np.isfinite(bound)
             near &= (t[:directions, number + 1] != speed).any(axis=0)
@@ -234,7 +234,7 @@ def _edges(
 ) -> tuple[list[SurfaceOnBound], list[SurfaceOnBound]]:
     """Where cuts lie on a bound and do not move with it: those that decide; and the others, also where they lie beside
     it by rounding."""
-    decides = np.array([row.cut >= 0 and plan.level.cuts[row.cut].decides for row in rows], dtype=bool)
+    decides = np.array([plan.decides(row.cut) for row in rows], dtype=bool)
     (low, _, _), (high, _, _) = ends
     found: list[tuple[int, SurfaceOnBound]] = []
     for upper, (bound, tb, e) in enumerate(ends):
@@ -284,9 +284,7 @@ def _sorted(
 
 
 def _rank(plan: LevelPlan, row: Row) -> int:
-    if row.cut < 0:
-        return 0
-    return 2 if plan.level.cuts[row.cut].decides else 1
+    return 2 if plan.decides(row.cut) else int(row.cut >= 0)
 
 
 def _put_at_one_place(x: Array, e: Array, close: Bools, rank: Ints) -> None:

@@ -180,15 +180,15 @@ class _Range:
         held = self.held(side, far, volume)
         most = np.max(held, axis=1, initial=0.0, where=np.isfinite(held))
         row = np.arange(start.size)
-        at, left = _first(held, NOTHING * most)
+        at, left = _first(held, most)
         reach = far[row, np.where(at <= SIZES.size, at, 0)]
         most = np.minimum(most, np.max(self.held(side, _parts(start, reach), volume), axis=1, initial=0.0))
-        at, left = _first(held, NOTHING * most)
+        at, left = _first(held, most)
         known = at <= SIZES.size
         at = np.where(known, at, 0)
         fine = _parts(far[row, np.maximum(at - 1, 0)], far[row, at])
         within = self.held(side, fine, volume)
-        part, left = _first(np.concatenate((within, left[:, None]), axis=1), NOTHING * most)
+        part, left = _first(np.concatenate((within, left[:, None]), axis=1), most)
         return np.where(known, fine[row, np.minimum(part, PARTS)], side * np.inf), left
 
     def held(self, side: float, places: Array, volume: Array) -> Array:
@@ -214,9 +214,9 @@ def _parts(start: Array, end: Array) -> Array:
     return parts
 
 
-def _first(held: Array, allowed: Array) -> tuple[Any, Array]:
-    """From which shell on all of them together hold no more than is allowed, and what they do."""
+def _first(held: Array, most: Array) -> tuple[Any, Array]:
+    """From which shell on all of them together hold next to nothing of the most that one holds, and what they do."""
     left = np.cumsum(held[:, ::-1], axis=1)[:, ::-1]
     left = np.concatenate((left, np.zeros((held.shape[0], 1))), axis=1)
-    at = np.argmax(left <= allowed[:, None], axis=1)
+    at = np.argmax(left <= (NOTHING * most)[:, None], axis=1)
     return at, left[np.arange(held.shape[0]), at]

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from msgspec import Struct
 
-from potto.integrate.columns import Columns
+from potto.integrate.columns import Columns, patterns_of
 from potto.integrate.levels import LevelPlan
 from potto.integrate.rules.gauss import EPS
 from potto.kernels.cells import Array, Bools, Ints
@@ -105,7 +105,7 @@ def tangents(t: tuple[Any, ...], batch: int, directions: int) -> Array:
 
 def meetings(plan: LevelPlan, rows: list[Row], inside: Bools, batch: int, directions: int) -> list[Meeting]:
     """The jumps of different surfaces that coincide inside the bounds and move apart."""
-    jumps = [i for i, row in enumerate(rows) if row.cut >= 0 and plan.level.cuts[row.cut].decides]
+    jumps = [i for i, row in enumerate(rows) if plan.decides(row.cut)]
     x = np.stack([as_array(rows[i].x, batch) for i in jumps]) if jumps else np.zeros((0, batch))
     e = np.stack([as_array(0.0 if rows[i].e is None else rows[i].e, batch) for i in jumps]) if jumps else x
     t = np.stack([tangents(rows[i].t, batch, directions) for i in jumps]) if jumps else np.zeros((0, 0, batch))
@@ -117,8 +117,7 @@ def meetings(plan: LevelPlan, rows: list[Row], inside: Bools, batch: int, direct
         apart = (np.abs(t - t[n]) > 1e-9 * (np.abs(t) + np.abs(t[n]))).any(axis=1)
         here = np.nonzero((on & apart).any(axis=0) & ~on[:n].any(axis=0))[0]
         on[n] = True
-        for pattern in np.unique(on[:, here], axis=1).T if here.size else ():
-            owner = here[(on[:, here] == pattern[:, None]).all(axis=0)]
+        for pattern, owner in patterns_of(on, here):
             met = np.nonzero(pattern)[0]
             speeds = t[met][:, :, owner]
             merged = np.take_along_axis(speeds, x[met][:, owner].argmin(axis=0)[None, None], axis=0)[0]
@@ -131,7 +130,7 @@ def slivers(
     kin: Ints | None,
 ) -> list[Sliver]:  # fmt: skip
     """Jumps that rounding does not tell apart. kin: of nodes of variables further out, whose they are."""
-    jumps = [row for row in rows if row.cut >= 0 and plan.level.cuts[row.cut].decides]
+    jumps = [row for row in rows if plan.decides(row.cut)]
     if not jumps:
         return []
     x = np.stack([as_array(row.x, batch) for row in jumps])

@@ -18,6 +18,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from potto.integrate.columns import patterns_of
 from potto.integrate.decomposition.cuts import NARROW, Cuts
 from potto.integrate.decomposition.meetings import Meeting, SurfaceOnBound, as_array
 from potto.integrate.degenerate.scene import IteratedVariable, all_subsets
@@ -220,8 +221,7 @@ def _on_one_bound(edges: Sequence[SurfaceOnBound], batch: int) -> list[list[Surf
         on = np.zeros((len(here), batch), dtype=bool)
         for n, edge in enumerate(here):
             on[n, edge.owner] = True
-        for pattern in np.unique(on[:, on.any(axis=0)], axis=1).T:
-            owner = np.nonzero((on == pattern[:, None]).all(axis=0))[0]
+        for pattern, owner in patterns_of(on, np.nonzero(on.any(axis=0))[0]):
             group = [e.pick(np.isin(e.owner, owner)) for e, there in zip(here, pattern, strict=True) if there]
             if len({e.cut for e in group}) == len(group):
                 out.append(group)

@@ -11,7 +11,7 @@ import numpy as np
 
 from potto.integrate.columns import distinct
 from potto.integrate.decomposition.cuts import Cuts
-from potto.integrate.degenerate.faces import THIN, Place, crossing, running, running_along, several
+from potto.integrate.degenerate.faces import THIN, Place, crossing, running
 from potto.integrate.degenerate.scene import IteratedVariable, around, placed
 from potto.integrate.events import Degenerate
 from potto.integrate.panels.panel_batch import PanelBatch
@@ -44,17 +44,20 @@ def steps_at_cuts(work: PanelBatch, whole: Pieces) -> Crossing | None:
     owner, x = seg.owner[right], seg.a[right]
     width = np.minimum((seg.b - seg.a)[right], (seg.b - seg.a)[left])
     scene = IteratedVariable(work.parent, work.number, work.level, work.env, {}, work.machine, work.batch, work.root)
-    along = running(scene, owner, x, np.maximum(seg.ea[right], x - seg.b[left]))
+    reach, known = np.maximum(seg.ea[right], x - seg.b[left]), not (work.parent.plan.hides or work.machine.frozen)
+    along = running(scene, owner, x, reach) > 0 if known else np.zeros(owner.size, dtype=bool)
     if not (work.conflict or work.rested or along.any()):
         return None
     beside = [end + sign * part * np.minimum(width, 1e300)
               for part in BESIDE for end, sign in ((x, 1.0), (seg.b[left], -1.0))]  # fmt: skip
     index = np.concatenate([right, left] * parts)
-    sides: dict[int, Mask] = {g: np.broadcast_to(take(m, index), index.shape) for g, m in work.sides.items()}
+    sides: dict[int, Mask] = {g: np.broadcast_to(m, index.shape) for g, m in take(work.sides, index).items()}
     crowded = (seg.a[right] > seg.b[left]) | (seg.blur[0, right] > 0)
-    if crowded.any() and (hidden := _between(scene, seg, left[crowded], right[crowded])).size:
-        work.machine.note(Degenerate(work.level.variable), scene.below(hidden))
-        return None
+    if crowded.any():  # where several run along, neither side says what lies between them
+        hidden = distinct(owner[crowded][running(scene, owner[crowded], x[crowded], reach[crowded]) > 1])
+        if hidden.size:
+            work.machine.note(Degenerate(work.level.variable), scene.below(hidden))
+            return None
     values = _inside(scene, owner, np.concatenate(beside), sides)
     after, before = values[:, 0::2], values[:, 1::2]
     mean = whole.size.reshape(work.width, -1, seg.a.size)[:, 0] / (seg.b - seg.a)
@@ -66,7 +69,7 @@ def steps_at_cuts(work: PanelBatch, whole: Pieces) -> Crossing | None:
         return None
     left, right = left[jumps], right[jumps]
     off = np.maximum(np.minimum(seg.ea[right], THIN * width[jumps]), x[jumps] - seg.b[left])
-    sides = {g: take(m, left) for g, m in work.sides.items()}
+    sides = take(work.sides, left)
     place = Place(owner[jumps], x[jumps], off, seg.ta[:, right], sides, (before - after)[:, 1, jumps])
     as_one = _move_as_one(work, whole, left, right, place.jump)
     found = crossing(scene, place, DISCONTINUITY * size[:, jumps]) if as_one else None
@@ -108,14 +111,6 @@ def _move_as_one(work: PanelBatch, whole: Pieces, left: Ints, right: Ints, jump:
     return True
 
 
-def _between(scene: IteratedVariable, seg: Segments, left: Ints, right: Ints) -> Ints:
-    """The members for which several surfaces run along what is further in between two segments, where neither says
-    what lies between them."""
-    owner, x = seg.owner[right], seg.a[right]
-    members: Ints = distinct(owner[several(scene, owner, x, np.maximum(seg.ea[right], x - seg.b[left]))])
-    return members
-
-
 def _neighbours(seg: Segments) -> tuple[Ints, Ints]:
     """The segments between which nothing lies but kinks, and what is too narrow to tell them apart."""
     width = seg.b - seg.a
@@ -134,7 +129,10 @@ def beneath(scene: IteratedVariable, cuts: Cuts) -> None:
     inner = np.zeros(seg.a.size, dtype=bool)
     inner[1:] = (seg.owner[1:] == seg.owner[:-1]) & (seg.a[1:] == seg.b[:-1]) & (seg.rank[1:] > 1)
     places = np.nonzero(inner & scene.counted(seg.owner))[0]
-    members = running_along(scene, seg.owner[places], seg.a[places], seg.ea[places]) if places.size else places
+    if not places.size:
+        return
+    owner = seg.owner[places]
+    members = distinct(owner[running(scene, owner, seg.a[places], seg.ea[places]) > 0])
     if members.size:
         scene.machine.note(Degenerate(scene.level.variable), scene.below(members))
 
@@ -169,7 +167,7 @@ def brush(scene: IteratedVariable, cuts: Cuts) -> None:
 def _inside(scene: IteratedVariable, owner: Ints, x: Array, sides: dict[int, Mask]) -> Array:
     """What is further in at several places for each of some members, (m, places, members)."""
     many = np.tile(owner, x.size // owner.size)
-    values, _ = scene.inside(many, placed(scene.level, many, x, scene.env, {})[0], sides)
+    values, _ = scene.inside(many, placed(scene.level, many, x, scene.env), sides)
     return values.reshape(values.shape[0], -1, owner.size)
 
 
@@ -186,7 +184,7 @@ def _bends(scene: IteratedVariable, owner: Ints, x: Array, upper: bool) -> bool:
     if scene.number + 2 < len(levels) or further.searched:
         return False
     aside = BESIDE[1] * (1 + np.abs(x)) * (-1 if upper else 1)
-    places = (placed(scene.level, owner, place, scene.env, {})[0] for place in (x, x + aside))
+    places = (placed(scene.level, owner, place, scene.env) for place in (x, x + aside))
     for row, beside in zip(*(numbers_at(further.frame, frozen, at) for at in places), strict=True):
         with np.errstate(invalid="ignore"):
             slow = np.abs(row.v - beside.v) <= SLOW * (1 + np.abs(row.v))

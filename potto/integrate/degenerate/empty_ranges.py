@@ -14,6 +14,7 @@ import numpy as np
 from msgspec import Struct
 from msgspec.structs import replace
 
+from potto.integrate.columns import patterns_of
 from potto.integrate.decomposition.meetings import SEARCHED, Row, as_array, tangents
 from potto.integrate.degenerate.coincidences import one_by_one
 from potto.integrate.degenerate.scene import IteratedVariable
@@ -58,7 +59,7 @@ def collapsed_ranges(
         return []
     tl, th = (tangents(bound.t, batch, directions) for bound in (lo, hi))
     off = sum(np.broadcast_to(0.0 if bound.e is None else bound.e, batch) for bound in (lo, hi))
-    jumps = [row for row in rows if row.cut >= 0 and level.level.cuts[row.cut].decides]
+    jumps = [row for row in rows if level.decides(row.cut)]
     found = []
     for owner, here in _by_jumps(jumps, low, empty):
         speeds = np.zeros((len(here), directions, owner.size))
@@ -79,8 +80,7 @@ def _by_jumps(jumps: list[Row], x: Array, empty: Bools) -> Iterator[tuple[Ints, 
     if not on[:, empty].any():
         yield np.nonzero(empty)[0], []
         return
-    for pattern in np.unique(on[:, empty], axis=1).T:
-        owner = np.nonzero(empty & (on == pattern[:, None]).all(axis=0))[0]
+    for pattern, owner in patterns_of(on, np.nonzero(empty)[0]):
         yield owner, [row for row, there in zip(jumps, pattern, strict=True) if there]
 
 

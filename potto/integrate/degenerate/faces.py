@@ -1,6 +1,6 @@
 """Faces of surfaces that run along all variables further in: what crosses them, integrated over these variables.
 
-Owns `crossing`, `several`, `running`, `running_along` and `Face`. Where a surface psi = 0 is a place of one variable x,
+Owns `crossing`, `running` and `Face`. Where a surface psi = 0 is a place of one variable x,
 whatever the variables y further in are, it has no section in y. Its boundary term is then an integral over y, in which
 F stands with the surface on either side and everything else as it falls at the place:
 
@@ -126,31 +126,17 @@ def _crossed(scene: IteratedVariable, place: Place, group: int, here: Bools) -> 
     owner, machine = place.owner[here], scene.machine
     env = gather(scene.env, owner)
     env[scene.level.variable] = Cell(place.x[here], None, (None,) * machine.directions)
-    sides = {g: take(m, np.nonzero(here)[0]) for g, m in place.sides.items()}
+    sides = take(place.sides, np.nonzero(here)[0])
     iteration = scene.parent.across(face)
     with nullcontext() if machine.costs is None else machine.costs.apart():
         sums = iteration.run(scene.number + 1, env, owner.size, sides, machine.standing(), scene.below(owner))
     return sums.v, sums.e, sums.t, sums.et
 
 
-def running(scene: IteratedVariable, owner: Ints, x: Array, off: Array) -> Bools:
-    """At which places, of some members, a surface runs along the variables further in, as far as that can be seen."""
-    along = None if scene.parent.plan.hides or scene.machine.frozen else _running_along(scene, owner, x, off)
-    return np.zeros(owner.size, dtype=bool) if along is None else np.asarray(along.there.any(axis=0))
-
-
-def several(scene: IteratedVariable, owner: Ints, x: Array, off: Array) -> Bools:
-    """At which places, of some members, more than one surface runs along the variables further in: what lies between
-    them may be seen from neither side."""
+def running(scene: IteratedVariable, owner: Ints, x: Array, off: Array) -> Ints:
+    """How many surfaces run along the variables further in at places of some members, as far as that can be seen."""
     along = _running_along(scene, owner, x, off)
-    return np.zeros(owner.size, dtype=bool) if along is None else along.there.sum(axis=0) > 1
-
-
-def running_along(scene: IteratedVariable, owner: Ints, x: Array, off: Array) -> Ints:
-    """The members that have places at which a surface runs along the variables further in."""
-    along = _running_along(scene, owner, x, off)
-    members: Ints = distinct(owner[:0] if along is None else owner[along.there.any(axis=0)])
-    return members
+    return np.zeros(owner.size, dtype=np.int64) if along is None else np.asarray(along.there.sum(axis=0))
 
 
 def _the_only_one(scene: IteratedVariable, along: Bools) -> Ints:

@@ -13,6 +13,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from potto.integrate.columns import patterns_of
 from potto.integrate.degenerate.scene import IteratedVariable, placed
 from potto.integrate.events import TwoSided
 from potto.integrate.pieces import Sums, take
@@ -33,10 +34,7 @@ def count_narrow(
     there = np.stack(list(doubtful.values()))
     index = np.nonzero(there.any(axis=0))[0]
     index = index[scene.counted(seg.owner[index])]
-    if not index.size:
-        return
-    for pattern in np.unique(there[:, index], axis=1).T:
-        part = index[(there[:, index] == pattern[:, None]).all(axis=0)]
+    for pattern, part in patterns_of(there, index):
         groups = [g for g, doubt in zip(doubtful, pattern, strict=True) if doubt]
         owner = seg.owner[part]
         apart = _difference(scene, seg, sides, groups, part) if len(groups) <= MOST_SURFACES else np.full(1, np.inf)
@@ -67,8 +65,7 @@ def _difference(
     """How far the integrand in the middle of some segments is from what it is with sides of some groups turned round,
     any of them: (m, S)."""
     x, _, _ = substitution.points(seg.pick(part), np.full((part.size, 1), 0.5))
-    here, _ = placed(scene.level, seg.owner[part], x[:, 0], scene.env, {})
-    own = {g: take(mask, part) for g, mask in sides.items()}
+    here, own = placed(scene.level, seg.owner[part], x[:, 0], scene.env), take(sides, part)
     found = []
     for turned in itertools.product((False, True), repeat=len(groups)):
         flipped = {g: np.logical_not(own[g]) for g, turn in zip(groups, turned, strict=True) if turn}

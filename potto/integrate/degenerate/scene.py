@@ -26,6 +26,8 @@ BESIDE, CLEAR = 1e-7, 4.0
 # of such values, and what a power falls by at the least from one to the next.
 NEARER, RESTS, FALLS = (2.0**-30, 2.0**-40, 2.0**-50), 1e-7, 0.9
 
+Pair = tuple[Array, Array]
+
 
 class IteratedVariable(Struct, frozen=True):
     """One variable of an iteration as it is being integrated: everything that is needed to evaluate its integrand.
@@ -95,7 +97,7 @@ class IteratedVariable(Struct, frozen=True):
         if room is None or not lost.size or not isinstance(x, Cell):
             return f, e
         at, far = as_array(x.v, owner.size)[lost], np.minimum(room[lost], 1.0)
-        some, given = gather(here, lost), {g: take(m, lost) for g, m in sides.items()}
+        some, given = gather(here, lost), take(sides, lost)
         size = np.where(at == 0, far, np.abs(at)) * (1 if above else -1)
         places = [{**some, self.level.variable: Cell(at + size * share)} for share in NEARER]
         found = np.stack([self.inside(owner[lost], place, given)[0] for place in places])
@@ -112,7 +114,7 @@ class IteratedVariable(Struct, frozen=True):
 
     def as_it_falls(self, owner: Ints, x: Array) -> Array:
         """F at x itself, (m, B): a surface that is 0 there is on the side that its comparison says."""
-        here, sides = placed(self.level, owner, x, self.env, self.sides)
+        here, sides = placed(self.level, owner, x, self.env), take(self.sides, owner)
         if self.level.decided:
             groups = self.parent.plan.groups
             values, _ = surfaces_at(self.level, here, owner.size, self.machine)
@@ -154,7 +156,7 @@ def around(
     room: how far it is to where they change. hidden: takes, by group, for whom rounding hides the side that is asked
     for first.
     """
-    here, inner = placed(level, owner, x, env, sides)
+    here, inner = placed(level, owner, x, env), take(sides, owner)
     if not level.decided:
         return here, [inner for _ in ways]
     size = 1 + np.abs(x)
@@ -180,17 +182,21 @@ def around(
     return here, beside
 
 
-def placed(
-    level: LevelPlan, owner: Ints, x: Array, env: dict[str, Value], sides: dict[int, Mask]
-) -> tuple[dict[str, Value], dict[int, Mask]]:
-    """The environment of some members at x, where nothing moves, and the sides that were decided further out."""
+def placed(level: LevelPlan, owner: Ints, x: Array, env: dict[str, Value]) -> dict[str, Value]:
+    """The environment of some members at x, where nothing moves."""
     here = gather({n: still(v) for n, v in env.items()}, owner)
     here[level.variable] = Cell(x)
-    return here, {g: take(m, owner) for g, m in sides.items()}
+    return here
 
 
-def surfaces_at(level: LevelPlan, here: dict[str, Value], count: int, machine: Evaluator) -> tuple[Array, Array]:
-    """The surfaces that a level decides the sides of, and their rounding, (G, B) each."""
+def surfaces_beside(level: LevelPlan, owner: Ints, x: Array, env: dict[str, Value], machine: Evaluator) -> Pair:
+    """The surfaces that a level decides the sides of, for some members at x, and their rounding, (G, B) each."""
+    here = placed(level, owner, x, {name: value for name, value in env.items() if name in level.surfaces.params})
+    return surfaces_at(level, here, owner.size, machine)
+
+
+def surfaces_at(level: LevelPlan, here: dict[str, Value], count: int, machine: Evaluator) -> Pair:
+    """The same in an environment."""
     found = _with_slopes(level, here, count, machine.with_directions(0))
     return found[:, 0], found[:, 1]
 

@@ -12,9 +12,9 @@ from collections.abc import Container, Iterator
 import numpy as np
 
 from potto.core.terms import function_of
-from potto.integrate.columns import distinct
+from potto.integrate.columns import distinct, patterns_of
 from potto.integrate.decomposition.vanishing import zero_on
-from potto.integrate.degenerate.scene import IteratedVariable, placed, surfaces_at
+from potto.integrate.degenerate.scene import IteratedVariable, placed, surfaces_beside
 from potto.integrate.events import undefined
 from potto.integrate.levels import LevelPlan
 from potto.integrate.pieces import Evaluator, gather, number_at, still, take
@@ -36,8 +36,7 @@ def sides_at(level: LevelPlan, env: dict[str, Value], seg: Segments, machine: Ev
     found: tuple[Array, Array] | None = None
     for share in LOOKED_AT:
         x, _, _ = substitution.points(seg, np.full((seg.a.size, 1), share))
-        here, _ = placed(level, seg.owner, x[:, 0], {n: v for n, v in env.items() if n in level.surfaces.params}, {})
-        now = surfaces_at(level, here, seg.a.size, machine)
+        now = surfaces_beside(level, seg.owner, x[:, 0], env, machine)
         found = now if found is None else _clearer(found, now)
         if not (np.isnan(found[0]) | (found[0] == 0)).any():
             break
@@ -59,14 +58,12 @@ def lost_members(scene: IteratedVariable, seg: Segments, undefined: dict[int, Bo
     """
     index = np.nonzero(np.any(list(undefined.values()), axis=0))[0]
     index = index if alive is None else np.intersect1d(index, alive)
-    patterns = np.stack([mask[index] for mask in undefined.values()])
     lost: list[Ints] = []
-    for pattern in np.unique(patterns, axis=1).T:
-        part = index[(patterns == pattern[:, None]).all(axis=0)]
+    for pattern, part in patterns_of(np.stack(list(undefined.values())), index):
         gone = [g for g, there in zip(undefined, pattern, strict=True) if there]
         x, _, _ = substitution.points(seg.pick(part), np.full((part.size, 1), LOOKED_AT[0]))
-        here, _ = placed(scene.level, seg.owner[part], x[:, 0], scene.env, {})
-        sides = {g: take(mask, seg.owner[part]) for g, mask in scene.sides.items() if g not in gone}
+        here = placed(scene.level, seg.owner[part], x[:, 0], scene.env)
+        sides = {g: side for g, side in take(scene.sides, seg.owner[part]).items() if g not in gone}
         f, _ = scene.inside(seg.owner[part], here, sides)
         bad = np.nonzero(np.isnan(f).any(axis=0))[0]
         if bad.size:
@@ -95,7 +92,7 @@ def guarded_samples(
 
     Of the others it is told where the first is, if it is a condition that has no value there. sides: those forced.
     """
-    below: dict[int, Mask] = {g: take(mask, index) for g, mask in sides.items()}
+    below = take(sides, index)
     above = dict(below)
     undefined: list[tuple[int, Bools]] = []
     here = gather(env, index)

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from potto.integrate.decomposition.meetings import Row, as_array
-from potto.integrate.degenerate.scene import placed, surfaces_at
+from potto.integrate.degenerate.scene import surfaces_beside
 from potto.integrate.levels import LevelPlan
 from potto.integrate.pieces import Evaluator
 from potto.kernels.cells import Array, Cell, Ints, Mask, Value
@@ -31,7 +31,6 @@ def unplaced(
     somewhere = any(there.any() if isinstance(there, np.ndarray) else there for there in none.values())
     for end in ends if somewhere else ():
         x: Array = as_array(end.v, batch)
-        here, _ = placed(level, everybody, x, {n: v for n, v in env.items() if n in level.surfaces.params}, {})
-        for there, value, off in zip(none.values(), *surfaces_at(level, here, batch, machine), strict=True):
+        for there, value, off in zip(none.values(), *surfaces_beside(level, everybody, x, env, machine), strict=True):
             found |= there & (np.abs(value) < off) & np.isfinite(x)
     return np.nonzero(found)[0]

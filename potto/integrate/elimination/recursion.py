@@ -27,7 +27,7 @@ from potto.integrate.elimination.interpolants import InterpolantTable, concentra
 from potto.integrate.elimination.step_plans import HIGH, LOW, Eliminated
 from potto.integrate.events import SurfaceFold, TwoSided
 from potto.integrate.levels import LevelPlan
-from potto.integrate.pieces import Evaluator, Sums, still
+from potto.integrate.pieces import Evaluator, Sums, box_of_numbers, still
 from potto.integrate.plan import Plan
 from potto.integrate.rules.gauss import EPS
 from potto.kernels.cells import Array, Cell, Mask, Value, pad
@@ -246,10 +246,7 @@ def _spans(
 ) -> tuple[list[tuple[float, float]], dict[str, Value]]:
     """Between which numbers the state of each step is, as far as it matters; and the ends of the ranges of variables
     that have densities, under their names."""
-    box: dict[str, tuple[float, float]] = {}
-    for name, value in env.items():
-        if isinstance(value, Cell):
-            box[name] = (float(np.ravel(value.v)[0]),) * 2
+    box = box_of_numbers(env)
     spans: list[tuple[float, float]] = []
     own: dict[str, Value] = {}
     before: EliminationStep | None = None

@@ -95,7 +95,7 @@ def summed(
             frame = numbers_at(frames[i], tracked, here)
         if put is not None:
             frame = put(i, frame)
-        block = _block(frame, k, shape) if i else _numbers(frame, k)
+        block = _block(frame, k, shape) if i else columns_of(frame, k)
         ends = block.take(layout.ends[i], axis=2)
         if i and _crossed(block[0, 0].reshape(len(frame), *shape), ends[0, 0, 0], ends[0, 0, 1], put is not None):
             return None
@@ -129,7 +129,7 @@ def _deeper(array: Array) -> Array:
     return array[..., None]
 
 
-def _numbers(frame: Sequence[Cell], k: int) -> Array:
+def columns_of(frame: Sequence[Cell], k: int) -> Array:
     """Cells that are one number each as one array: (2, 1 + k, cells), the numbers and their errors."""
     none = (None,) * k
     parts = ([(c.v, *(c.t or none)) for c in frame], [(c.e, *(c.et or none)) for c in frame])

@@ -22,15 +22,16 @@ import numpy as np
 from msgspec import Struct
 
 from potto.calculus.algebra.ranges import range_of
+from potto.calculus.surfaces.branch_assignment import box_of
 from potto.core.terms import Integral, Term
 from potto.integrate.decomposition.meetings import as_array
 from potto.integrate.degenerate.undefined import fallen
 from potto.integrate.levels import HINT
 from potto.integrate.montecarlo.cube_map import Chart, Point, label_of
 from potto.integrate.montecarlo.surface_terms import Surface
-from potto.integrate.pieces import Evaluator, Sums, numbers_at, still
+from potto.integrate.pieces import Evaluator, Sums, box_of_numbers, numbers_at, still
 from potto.integrate.plan import Plan
-from potto.kernels.cells import Array, Cell, Mask, Number, Value
+from potto.kernels.cells import Array, Mask, Number, Value
 
 MISSED = 10.0
 FEW = 16
@@ -132,14 +133,7 @@ PROBES = 128
 
 def box_of_values(term: Integral, env: Mapping[str, Value]) -> dict[str, tuple[float, float]]:
     """Between which numbers parameters and variables are, for one member of a batch."""
-    box: dict[str, tuple[float, float]] = {}
-    for name, value in env.items():
-        if isinstance(value, Cell):
-            box[name] = (float(np.ravel(value.v)[0]),) * 2
-    for variable, (lo, hi) in zip(term.variables, term.bounds, strict=True):
-        low, high = range_of(lo, box), range_of(hi, box)
-        box[variable] = (min(low.lo, high.lo), max(low.hi, high.hi))
-    return box
+    return box_of(term, box_of_numbers(env))
 
 
 def may_vanish(surface: Term, box: Mapping[str, tuple[float, float]]) -> bool:

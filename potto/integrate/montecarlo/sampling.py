@@ -331,7 +331,7 @@ class _Run(Struct, dict=True):
             return found.sums
         sides = {**self.turning(point, n), **sides}
         here = env if found is None else gather(env, rest)
-        sums = self.iteration.run(self.drawn, here, rest.size, {g: take(m, rest) for g, m in sides.items()}, machine)
+        sums = self.iteration.run(self.drawn, here, rest.size, take(sides, rest), machine)
         return sums if found is None else found.sums.with_members(rest, sums)
 
     def turning(self, point: Point, n: int) -> dict[int, Mask]:

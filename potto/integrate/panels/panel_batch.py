@@ -326,7 +326,7 @@ class PanelBatch(Struct, dict=True):
         counted as evaluations: (m, I)."""
         x, _, _ = substitution.points(self.seg.pick(index), np.tile(WITHIN, (index.size, 1)))
         rows = np.repeat(index, WITHIN.size)
-        sides = {g: take(m, rows) for g, m in self.sides.items()}
+        sides = take(self.sides, rows)
         here = self.standing(x.ravel(), self.seg.owner[rows])
         numbers, errors = dense(
             self.parent.body(here, sides, self.machine.with_directions(0).tracking()), 0, rows.shape

@@ -1,4 +1,4 @@
-"""Errors that answers of before bring into new ones.
+"""Errors that new answers inherit from earlier ones.
 
 Owns `rough` and `widened`. The rules of errors follow a number through arithmetic and integrands; to how fast a jump
 moves that an answer places, they do not. So what is made of an answer that is less accurate than is asked for now is
@@ -13,10 +13,8 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from potto.diagnostics import PottoError
-from potto.integrate.events import Events
 from potto.kernels.cells import Cell, Number, Value
 from potto.runtime.evaluation.machine import Machine
-from potto.runtime.evaluation.record import Record
 
 
 def rough(value: Value, rtol: float, atol: float) -> bool:
@@ -52,13 +50,11 @@ def _at(machine: Machine, key: tuple[str, str], held: Value, again: Callable[[Ma
     """The value if the answer were another one; None where it has none then."""
     linker = copy.copy(machine.linker)
     linker.held, linker.constants = {**linker.held, key: held}, {}
-    other = machine.changed(linker=linker, events=Events(), record=Record(gauge=machine.record.gauge))
-    try:
-        return again(other)
-    except PottoError:
-        return None
-    finally:
-        machine.record.evaluations += other.record.evaluations
+    with machine.unrecorded(linker=linker) as other:
+        try:
+            return again(other)
+        except PottoError:
+            return None
 
 
 def _covering(value: Value, others: list[Value | None]) -> Value:

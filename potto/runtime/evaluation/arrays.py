@@ -13,7 +13,7 @@ from potto.core.terms import Array as ArrayTerm
 from potto.core.terms import Length, lam
 from potto.diagnostics import PottoError, declare
 from potto.kernels import errors
-from potto.kernels.cells import Cell, Env, Number, Rows, Value, all_arrays, listed
+from potto.kernels.cells import Cell, Env, Number, Rows, Value, batch_shape, listed
 from potto.kernels.rows import gathered
 from potto.kernels.whole import SHORT, looked_through
 from potto.runtime.evaluation.functions import Closure, chosen, holds_functions
@@ -32,7 +32,7 @@ def array(machine: Machine, term: ArrayTerm, size: Value, env: Env) -> Value:
     count = _size(size)
     params = tuple(sorted(term.body.free | {term.variable}))
     body = lam(params, term.body)
-    shape = np.broadcast_shapes(*(a.shape for v in env.values() for a in all_arrays(v)))
+    shape = batch_shape(env.values())
     if count == 0:
         return Rows(Cell(np.zeros(0), None, (None,) * machine.directions), 0)
     places = np.arange(count, dtype=float).reshape(count, *(1,) * len(shape))

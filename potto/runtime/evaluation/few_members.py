@@ -14,20 +14,18 @@ from functools import reduce
 
 import numpy as np
 
-from potto.integrate.events import Events
 from potto.kernels.cells import (
     Array,
     Cell,
     Number,
     Value,
-    all_arrays,
     all_cells,
+    batch_shape,
     combined,
     map_arrays,
     map_cells,
 )
 from potto.runtime.evaluation.machine import Machine
-from potto.runtime.evaluation.record import Record
 
 MOST = 1024  # members, each of which takes a run of its own: 0.1 ms and more
 
@@ -44,7 +42,7 @@ def told_alone(value: Value, machine: Machine, env: Mapping[str, Value], found: 
     # a sum tells it in a third of the time of a look at each
     if all(math.isfinite(part if np.ndim(part) == 0 else np.add.reduce(part, None)) for part in parts):
         return value
-    shape = np.broadcast_shapes(*(a.shape for own in env.values() for a in all_arrays(own)))
+    shape = batch_shape(env.values())
     if len(shape) != 1:
         return value
     known, number = (
@@ -53,9 +51,8 @@ def told_alone(value: Value, machine: Machine, env: Mapping[str, Value], found: 
     )
     members = np.flatnonzero(np.broadcast_to(number & ~known, shape))
     for member in members if members.size <= MOST else ():
-        apart = machine.changed(events=Events(), record=Record(gauge=machine.record.gauge))
-        alone = found(apart, {name: _of(own, int(member), shape) for name, own in env.items()})
-        machine.record.evaluations += apart.record.evaluations
+        with machine.unrecorded() as apart:
+            alone = found(apart, {name: _of(own, int(member), shape) for name, own in env.items()})
         value = combined(lambda whole, own, at=member: _put(whole, own, at, shape), value, alone)
     return value
 

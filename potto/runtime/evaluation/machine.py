@@ -170,10 +170,8 @@ class Machine:
 
     def sampled(self, share: float, limit: bool) -> None:
         """So much of the sampling of an integral is done, with `limit` of the most that it may take; 0 begins it."""
-        gauge = self.record.gauge
-        if gauge is not None:
-            gauge.samplings += share == 0
-            gauge.sampled(share, limit)
+        if self.record.gauge is not None:
+            self.record.gauge.sampled(share, limit)
 
     def search(self, boxes: int) -> bool:
         """Note that places are searched for in so many boxes more. Whether that is within the budget."""
@@ -214,6 +212,15 @@ class Machine:
         """The machine apart, for which these members are all that there are, with a budget of their own."""
         with self.record.among(index.size):
             yield self.apart()
+
+    @contextmanager
+    def unrecorded(self, **fields: Any) -> Iterator[Machine]:
+        """The machine apart, with other values of some fields, of whose record nothing counts but the evaluations."""
+        other = self.changed(events=Events(), record=Record(costs=None, gauge=self.record.gauge), **fields)
+        try:
+            yield other
+        finally:
+            self.record.evaluations += other.record.evaluations
 
     # Terms over batches
 
@@ -334,7 +341,7 @@ class Machine:
         self.record.depth -= 1
         return value
 
-    # Branches, sums
+    # Branches, sums, arrays, integrals
 
     def falls(self, surface: Number, strict: bool) -> tuple[Any, Any]:
         """Which side a surface falls on, and nan wherever it is nan."""
@@ -365,8 +372,6 @@ class Machine:
     def sum(self, term: Sum, lo: Value, hi: Value, env: dict[str, Value], trace: Trace | None) -> Value:
         return self.semantics.sum(self, term, lo, hi, env, trace)
 
-    # Arrays
-
     def array(self, term: Array, size: Value, env: dict[str, Value]) -> Value:
         return self.semantics.array(self, term, size, env)
 
@@ -391,10 +396,5 @@ class Machine:
             found = self.linker.data[term] = self.semantics.data(term)
         return pad(found, self.directions)
 
-    # Integrals
-
     def integral(self, term: Integral, env: dict[str, Value]) -> Value:
         return self.semantics.integral(self, term, env)
-
-
-__all__ = ["Linker", "Machine", "Record"]

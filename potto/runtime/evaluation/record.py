@@ -18,7 +18,7 @@ from potto.core.terms import Term
 from potto.integrate import costs
 from potto.integrate.costs import Costs
 from potto.integrate.decomposition.root_isolation import Isolated
-from potto.integrate.events import Events, OneSidedDerivatives, Shortfall, TwoSided
+from potto.integrate.events import Events, OneSidedDerivatives, Shortfall, TwoSided, mask_of
 from potto.kernels.cells import Array, Value
 from potto.kernels.tape import Node
 from potto.runtime.answers.allowances import NOTHING, Allowed
@@ -54,7 +54,8 @@ class Gauge(Struct):
             self.share = evaluations / most
 
     def sampled(self, share: float, limit: bool) -> None:
-        """So much of the integral that is sampled is done."""
+        """So much of the integral that is sampled is done; 0 begins it."""
+        self.samplings += share == 0
         self.share, self.limit = (share, limit) if self.samplings == 1 else (0.0, True)
 
 
@@ -187,12 +188,7 @@ class Record(Struct):
     def tell(self, events: Events, batch: int, shape: tuple[int, ...]) -> None:
         """Add what the integrals of a whole batch have met to what the answer says, in the batch's shape."""
         for why, members in events.every(Shortfall):
-            where: Any = True
-            if shape:
-                where = np.full(batch, members is None)
-                where[[] if members is None else members] = True
-                where = where.reshape(shape)
-            merged(self.shortfalls, {why: where})
+            merged(self.shortfalls, {why: mask_of(members, batch).reshape(shape) if shape else True})
         edges: dict[TwoSided, list[Array]] = {}
         for edge, members in events.every(OneSidedDerivatives):
             count = batch if members is None else members.size

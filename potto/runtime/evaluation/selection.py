@@ -1,7 +1,7 @@
 """Conditionals whose sides are evaluated only where they are taken.
 
-Owns `lazy`, and `apart`. With one outcome for the whole batch one side is evaluated; otherwise the batch is split, each
-side evaluated on its own members, and the results put together again.
+Owns `lazy`, `apart`, `by_numbers` and `by_bounds`. With one outcome for the whole batch one side is evaluated;
+otherwise the batch is split, each side evaluated on its own members, and the results put together again.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from potto.kernels.cells import (
     Number,
     Trace,
     Value,
-    all_arrays,
+    batch_shape,
     combined,
     map_arrays,
     map_cells,
@@ -52,8 +52,7 @@ def side(machine: Machine, term: If | Branch, env: dict[str, Value], which: int,
 
 
 def split(machine: Machine, mask: Any, term: If | Branch, env: dict[str, Value], traces: tuple[Any, Any]) -> Value:
-    arrays = [a for value in env.values() for a in all_arrays(value)]
-    full = np.broadcast_to(mask, np.broadcast_shapes(mask.shape, *(a.shape for a in arrays)))
+    full = np.broadcast_to(mask, batch_shape(env.values(), mask.shape))
 
     def evaluated(which: int, here: dict[str, Value], pick: Pick) -> Value:
         return side(machine, term, here, which, map_trace(traces[which], pick))
@@ -89,6 +88,29 @@ def apart(
     return _together(parts, masks, whole)
 
 
+def by_numbers(
+    numbers: Number, env: dict[str, Value], evaluated: Callable[[float, dict[str, Value], Pick], Value]
+) -> Value:
+    """The values of a batch, the members that have the same number together."""
+    full, each = np.broadcast_to(numbers, batch_shape(env.values(), np.shape(numbers))), np.unique(numbers)
+    return apart([full == one for one in each], env, lambda place, here, pick: evaluated(each[place], here, pick))
+
+
+def by_bounds(
+    first: Number, last: Number, env: dict[str, Value], evaluated: Callable[[Cell, Cell, dict[str, Value]], Value]
+) -> Value:
+    """The values of a batch over which bounds differ, the members with equal ones together."""
+    shape = batch_shape(env.values(), np.shape(first), np.shape(last))
+    lo, hi = np.broadcast_to(first, shape), np.broadcast_to(last, shape)
+    pairs = np.unique(np.stack([lo.ravel(), hi.ravel()]), axis=1).T
+
+    def of(number: int, here: dict[str, Value], _: Pick) -> Value:
+        a, b = pairs[number]
+        return evaluated(Cell(float(a)), Cell(float(b)), here)
+
+    return apart([(lo == a) & (hi == b) for a, b in pairs], env, of)
+
+
 def _together(parts: Sequence[Value], masks: Sequence[Bools], whole: Callable[..., Array]) -> Value:
     """The values of the members of each mask as those of all; functions as one of which each member has chosen its
     own. whole: puts the numbers of all masks together."""
@@ -113,15 +135,10 @@ def _spoil(value: Value, nan: Number) -> Value:
 def chosen(machine: Machine, function: Chosen, groups: tuple[tuple[Value, ...], ...]) -> Value:
     """Several functions called, each for the members that have chosen it."""
     given: dict[str, Value] = {f"{i}.{j}": arg for i, group in enumerate(groups) for j, arg in enumerate(group)}
-    where = np.asarray(function.places.v)
-    shape = np.broadcast_shapes(where.shape, *(a.shape for value in given.values() for a in all_arrays(value)))
-    full = np.broadcast_to(where, shape)
-    numbers = [int(place) for place in np.unique(where)]
-    options = [function.options[place] for place in numbers]
 
-    def evaluated(number: int, here: dict[str, Value], pick: Pick) -> Value:
-        option = options[number].change(lambda value: map_arrays(value, pick))
+    def evaluated(place: float, here: dict[str, Value], pick: Pick) -> Value:
+        option = function.options[int(place)].change(lambda value: map_arrays(value, pick))
         called = tuple(tuple(here[f"{i}.{j}"] for j in range(len(group))) for i, group in enumerate(groups))
         return machine.call(option, called, None)
 
-    return apart([full == place for place in numbers], given, evaluated)
+    return by_numbers(function.places.v, given, evaluated)

@@ -15,12 +15,12 @@ from potto.calculus.inlining.lattices import REACH, middle
 from potto.core.terms import Sum, Tuple, lam
 from potto.diagnostics import PottoError
 from potto.kernels import errors
-from potto.kernels.cells import Cell, Number, Rows, Trace, Value, all_arrays, combined, listed, map_arrays, map_cells
+from potto.kernels.cells import Cell, Number, Rows, Trace, Value, batch_shape, combined, listed, map_arrays, map_cells
 from potto.kernels.tape import Node
 from potto.kernels.whole import LARGEST, PAIRWISE, ROUNDING, SHORT, looked_through
 from potto.runtime.answers.allowances import NOTHING
 from potto.runtime.evaluation.machine import Machine
-from potto.runtime.evaluation.selection import Pick, apart
+from potto.runtime.evaluation.selection import by_bounds
 
 MOST_TERMS = 10_000_000
 CHUNK = 1 << 18
@@ -29,7 +29,7 @@ CHUNK = 1 << 18
 def total(machine: Machine, term: Sum, lo: Value, hi: Value, env: dict[str, Value], trace: Trace | None) -> Value:
     first, last = bounds(lo, "lower"), bounds(hi, "upper")
     if isinstance(first, np.ndarray) or isinstance(last, np.ndarray):
-        return _grouped(machine, term, first, last, env)
+        return by_bounds(first, last, env, lambda lo, hi, here: total(machine, term, lo, hi, here, None))
     if last < first:
         return tuple(Cell(0.0) for _ in term.body.items) if isinstance(term.body, Tuple) else Cell(0.0)
     if last - first >= MOST_TERMS:
@@ -38,7 +38,7 @@ def total(machine: Machine, term: Sum, lo: Value, hi: Value, env: dict[str, Valu
     body = lam(params, term.body)
     if trace:
         return _one_by_one(machine, term, body, int(first), int(last), env, trace)
-    shape = np.broadcast_shapes(*(a.shape for v in env.values() for a in all_arrays(v)))
+    shape = batch_shape(env.values())
     wide = {n: map_arrays(v, lambda a: a[..., None]) for n, v in env.items()}
     if last - first >= REACH and (place := middle(term)) is not None:
         here = {n: map_cells(wide[n], lambda cell: Cell(cell.v)) for n in place.free}
@@ -100,20 +100,6 @@ def _one_by_one(
         value = machine.run(body, [here[p] for p in body.params], trace.get(number))
         result = value if number == 0 else plus(result, value)
     return result
-
-
-def _grouped(machine: Machine, term: Sum, first: Number, last: Number, env: dict[str, Value]) -> Value:
-    """Bounds that differ over the batch: the members with equal bounds together."""
-    arrays = [a for v in env.values() for a in all_arrays(v)]
-    shape = np.broadcast_shapes(np.shape(first), np.shape(last), *(a.shape for a in arrays))
-    lo, hi = np.broadcast_to(first, shape), np.broadcast_to(last, shape)
-    pairs = np.unique(np.stack([lo.ravel(), hi.ravel()]), axis=1).T
-
-    def evaluated(number: int, here: dict[str, Value], _: Pick) -> Value:
-        a, b = pairs[number]
-        return total(machine, term, Cell(float(a)), Cell(float(b)), here, None)
-
-    return apart([(lo == a) & (hi == b) for a, b in pairs], env, evaluated)
 
 
 def _reduce(value: Value, shape: tuple[int, ...], count: int) -> Value:

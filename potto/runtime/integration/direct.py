@@ -41,7 +41,7 @@ from potto.integrate.fixed.proved_sums.a_priori import proved_gradient, proved_s
 from potto.integrate.fixed.proved_sums.settled import SettledRegion
 from potto.integrate.fixed.steps.step_sums import SteppedCall
 from potto.integrate.fixed.straight import StraightIntegral
-from potto.kernels.cells import Cell, Env, Value, all_arrays, map_arrays, pad
+from potto.kernels.cells import Cell, Env, Value, batch_shape, map_arrays, pad
 from potto.kernels.making import making
 from potto.kernels.tape import Node
 from potto.runtime.answers.allowances import Allowance, allowance_of_one
@@ -173,7 +173,7 @@ class Direct(Struct, frozen=True):
         self, machine: Machine, working: Machine, env: Mapping[str, Value]
     ) -> tuple[dict[str, Value], StraightIntegral | None]:
         """The parameters of the integral, and its rule; None where there is no such rule."""
-        if machine.settings.method in ("mc", "qmc") or (self.dual and machine.directions):
+        if machine.settings.sampled or (self.dual and machine.directions):
             return {}, None
         here, functions = self._given(machine, env)
         if here is None:
@@ -242,7 +242,7 @@ def _batched(env: Mapping[str, Value]) -> bool:
 
 def _members(env: Mapping[str, Value]) -> int:
     """How many members a batch has with these parameters."""
-    return math.prod(np.broadcast_shapes(*(a.shape for value in env.values() for a in all_arrays(value))))
+    return math.prod(batch_shape(env.values()))
 
 
 class _Passed(Exception):

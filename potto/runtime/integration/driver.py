@@ -20,15 +20,14 @@ from potto.diagnostics import PottoError
 from potto.integrate.events import BUDGET_SPENT
 from potto.integrate.pieces import INTO, OF, Sums, gather, still
 from potto.kernels import errors
-from potto.kernels.cells import Array, Cell, Ints, Value, all_arrays, map_arrays, pad
+from potto.kernels.cells import Cell, Ints, Value, batch_shape, map_arrays, pad
 from potto.kernels.making import making
 from potto.runtime.answers.allowances import left_by
 from potto.runtime.evaluation.functions import Chosen, choices, settled
 from potto.runtime.evaluation.local import locally
 from potto.runtime.evaluation.machine import Machine
-from potto.runtime.evaluation.selection import Pick, apart
+from potto.runtime.evaluation.selection import Pick, by_numbers
 from potto.runtime.integration.derivatives.rims import note_rims
-from potto.runtime.integration.methods.choices import SAMPLED
 from potto.runtime.integration.methods.members import Whole
 from potto.runtime.integration.preparation.arrays import Differ, Read, as_written, in_numbers, met, without_arrays
 from potto.runtime.integration.preparation.compared import compares, with_compared
@@ -50,7 +49,7 @@ def integral(machine: Machine, term: Integral, env: dict[str, Value]) -> Value:
         try:
             ready, env, reads = without_arrays(machine, term, env)
         except Differ as differ:
-            return _by_length(machine, term, env, differ.ends)
+            return by_numbers(differ.ends, env, lambda _, here, __: integral(machine, term, here))
         if not isinstance(ready, Integral):
             return together(machine, ready, env)
         term, read = ready, read | reads
@@ -61,7 +60,7 @@ def integral(machine: Machine, term: Integral, env: dict[str, Value]) -> Value:
     try:
         term = in_sight(machine, term, env)
     except Differ as differ:
-        return _by_length(machine, term, env, differ.ends)
+        return by_numbers(differ.ends, env, lambda _, here, __: integral(machine, term, here))
     known = machine.record.surfaces()
     value = locally(machine, env, lambda own, here: _of_numbers(own, term, here))
     as_written(machine.record, known, read)
@@ -78,7 +77,7 @@ def _of_numbers(machine: Machine, term: Integral, env: dict[str, Value]) -> Valu
         term, stopped = held(term)
         env = {**env, **{new: pad(still(env[old]), machine.directions) for old, new in stopped}}
     with making:
-        sampled = machine.settings.method in SAMPLED
+        sampled = machine.settings.sampled
         fewer = term if sampled else combined(term)  # before deltas take a variable's density apart
         ready = prepared(term, linker.reach) if fewer is term else fewer
         if ready is term and not sampled:
@@ -94,23 +93,11 @@ def _of_numbers(machine: Machine, term: Integral, env: dict[str, Value]) -> Valu
 
 def _by_choice(machine: Machine, term: Integral, env: dict[str, Value], different: Chosen) -> Value:
     """The members for which one function is the same together: what it does is part of what is integrated."""
-    places = np.asarray(different.places.v)
-    shape = np.broadcast_shapes(places.shape, *(a.shape for value in env.values() for a in all_arrays(value)))
-    full = np.broadcast_to(places, shape)
-    masks = [full == place for place in np.unique(places)]
 
-    def evaluated(_: int, here: dict[str, Value], pick: Pick) -> Value:
+    def evaluated(_: float, here: dict[str, Value], __: Pick) -> Value:
         return integral(machine, term, {name: settled(value) for name, value in here.items()})
 
-    return apart(masks, env, evaluated)
-
-
-def _by_length(machine: Machine, term: Integral, env: dict[str, Value], ends: Array) -> Value:
-    """The members whose loops and recursions are of one length together."""
-    shape = np.broadcast_shapes(ends.shape, *(a.shape for value in env.values() for a in all_arrays(value)))
-    full = np.broadcast_to(ends, shape)
-    masks = [full == end for end in np.unique(ends)]
-    return apart(masks, env, lambda _, here, pick: integral(machine, term, here))
+    return by_numbers(different.places.v, env, evaluated)
 
 
 def integrate(machine: Machine, term: Integral, env: dict[str, Value]) -> Value:
@@ -128,13 +115,12 @@ def integrate(machine: Machine, term: Integral, env: dict[str, Value]) -> Value:
 
 
 def _integrate(machine: Machine, term: Integral, env: dict[str, Value], outermost: bool) -> Value:
-    arrays = [a for value in env.values() for a in all_arrays(value)]
-    shape = np.broadcast_shapes(*(a.shape for a in arrays)) if arrays else ()
-    batch = int(np.prod(shape)) if shape else 1
+    shape = batch_shape(env.values())
+    batch = math.prod(shape)
     if batch == 0:
         return Cell(np.zeros(shape))
     flat = env
-    if arrays:
+    if shape:
         flat = {n: map_arrays(v, lambda a: np.ascontiguousarray(np.broadcast_to(a, shape)).reshape(-1))
                 for n, v in env.items()}  # fmt: skip
     if batch == 1 and shape:

@@ -190,9 +190,8 @@ class Problem:
     def on_known_sides(self) -> list[tuple[Ints, Integral]]:
         """For the members of which some surfaces are known to pass all by: what is left of the integral, and of which
         members it is that. Of many members it is not asked."""
-        machine = self.machine
-        drawn = machine.settings.method in ("mc", "qmc")
-        if self.batch > MOST_LOOKED_AT or not self.outermost or drawn or machine.costs is not None:
+        settings, costs = self.machine.settings, self.machine.costs
+        if self.batch > MOST_LOOKED_AT or not self.outermost or settings.sampled or costs is not None:
             return []
         found: dict[Integral, list[int]] = {}
         with making:

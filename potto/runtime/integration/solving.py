@@ -21,6 +21,7 @@ from potto.integrate.events import (
     UNCOUNTED_JUMP,
     Degenerate,
     Shortfall,
+    mask_of,
 )
 from potto.integrate.fixed.at_sight import at_sight
 from potto.integrate.pieces import Sums, still
@@ -79,24 +80,23 @@ def solve(problem: Problem) -> Sums:
 
 def by_elimination(problem: Problem) -> Sums | None:
     """One variable after the other, where each hands on one number."""
-    if problem.machine.settings.method in ("mc", "qmc") or not many(problem):
+    if problem.machine.settings.sampled or not many(problem):
         return None
     return step_by_step(problem, WORTH if too_many(problem) else ACCURATE)
 
 
 def by_samples(problem: Problem) -> Sums | None:
     """All variables at once, where that was asked for, or where they are too many for rules."""
-    method = problem.machine.settings.method
-    if placed_along(problem.term) is not None or (method not in ("mc", "qmc") and not too_many(problem)):
+    if placed_along(problem.term) is not None or not (problem.machine.settings.sampled or too_many(problem)):
         return None
-    return _drawn(problem, method)
+    return _drawn(problem)
 
 
-def _drawn(problem: Problem, method: str) -> Sums:
+def _drawn(problem: Problem) -> Sums:
     """What samples tell."""
     from potto.integrate.montecarlo.sampling import sample
 
-    plan = problem.plan()
+    plan, method = problem.plan(), problem.machine.settings.method
     sums = counted(problem, plan, sample(plan, problem.machine, problem.env, problem.batch, method), drawn=True)
     problem.machine.record.methods.add("mc" if method == "mc" else "qmc")
     sums.et[:, :, _blind(problem)] = np.inf  # what crosses those that were left out is not known
@@ -200,7 +200,7 @@ def _by_samples_instead(problem: Problem, found: Attempt) -> Sums | None:
     if not many(problem) or uncertainty(found.sums) <= PROMISING:
         return None
     apart = problem.apart()
-    drawn = _drawn(apart, problem.machine.settings.method)
+    drawn = _drawn(apart)
     if uncertainty(drawn) >= uncertainty(found.sums):
         return None
     problem.events.take(apart.events, np.arange(problem.batch))
@@ -255,7 +255,7 @@ def counted(problem: Problem, plan: Plan, sums: Sums, drawn: bool = False) -> Su
 
 
 def unbounded(problem: Problem, sums: Sums) -> Sums:
-    """Rules on panels that should have been cut further are good for nothing."""
+    """The sums, with no bound for members of which a part was not seen: rules on panels that lack cuts tell nothing."""
     blind = _blind(problem)
     if blind.size:
         sums.e[:, blind], sums.et[:, :, blind] = np.inf, np.inf
@@ -267,7 +267,7 @@ def _blind(problem: Problem) -> Ints:
     mask = np.zeros(problem.batch, dtype=bool)
     for shortfall, members in problem.events.every(Shortfall):
         if shortfall.blind:
-            mask[slice(None) if members is None else members] = True
+            mask |= mask_of(members, problem.batch)
     return np.nonzero(mask)[0]
 
 

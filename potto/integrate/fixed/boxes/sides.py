@@ -23,10 +23,10 @@ from potto.core.terms import Branch, Integral, Lam, Term, function_of, postorder
 from potto.integrate.fixed.boxes.tensor_product import Bounds, BoxIntegrand
 from potto.integrate.fixed.lowered.box_text import NEAR
 from potto.integrate.fixed.straight import MOST_TERMS, StraightIntegral
-from potto.integrate.pieces import Evaluator, gather, numbers_at
+from potto.integrate.pieces import Evaluator, gather, numbers_at, resting
 from potto.integrate.rules.intervals import Interval
 from potto.integrate.rules.lowered_intervals import enclosures
-from potto.kernels.cells import Array, Bools, Cell, Ints, Value, map_cells
+from potto.kernels.cells import Array, Bools, Cell, Ints, Value
 
 MOST_VARIABLES = 3
 # Members that are enclosed together; and that are done at once, whose numbers stay in the cache.
@@ -250,7 +250,7 @@ def _at_corners(
         return
     corners = list(itertools.product((0, 1), repeat=len(box.variables)))
     function = box.corners
-    here = {name: map_cells(env[name], lambda cell: Cell(cell.v, cell.e)) for name in function.params if name in env}
+    here = {name: resting(env[name]) for name in function.params if name in env}
     for n, variable in enumerate(box.variables):
         here[variable] = Cell(np.stack([(low[n], high[n])[corner[n]] for corner in corners]))
     for value in numbers_at(function, machine.with_directions(0).tracking(), here):

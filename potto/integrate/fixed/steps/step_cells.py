@@ -16,7 +16,7 @@ import numpy as np
 from msgspec import Struct
 
 from potto.core.terms import Const, children
-from potto.integrate.fixed.moving_sums import any_moves
+from potto.integrate.fixed.moving_sums import any_moves, columns_of
 from potto.integrate.fixed.steps.step_integral import StepIntegral
 from potto.integrate.fixed.steps.step_sides import Passed, Sides, layout, same_leads, sides_of, taken
 from potto.integrate.fixed.straight import CLEAR
@@ -193,10 +193,8 @@ def _are_whole(numbers: Array, errors: Array) -> bool:
 def _rows(cells: Sequence[Cell], k: int, shape: tuple[int, ...]) -> tuple[Array, Array]:
     """Cells and their errors with tangents as rows, (1 + k, [B,] R) each."""
     if not shape:
-        none = (None,) * k
-        columns = ([(c.v, *(c.t or none)) for c in cells], [(c.e, *(c.et or none)) for c in cells])
-        found = np.array([[[row[d] or 0.0 for row in rows] for d in range(1 + k)] for rows in columns])
-        return found[0], found[1]
+        numbers, errors = columns_of(cells, k)
+        return numbers, errors
     out = np.zeros((2, 1 + k, len(cells), *shape))
     for row, cell in enumerate(cells):
         for part, numbers in enumerate(((cell.v, *cell.t), (cell.e, *cell.et))):

@@ -21,7 +21,7 @@ from potto.core.terms import Const, children
 from potto.integrate.fixed.steps.step_choices import Choice, Heads
 from potto.integrate.fixed.steps.step_integral import StepIntegral, asked_between, probe
 from potto.integrate.fixed.straight import CLEAR
-from potto.integrate.pieces import Evaluator, numbers_at
+from potto.integrate.pieces import Evaluator, numbers_at, resting
 from potto.kernels.cells import Array, Bools, Cell, Ints, Value
 
 
@@ -173,15 +173,11 @@ def _asked(
         where[numbers] = np.moveaxis(middles, 0, -1) if shape else middles
     values = np.zeros((2, len(children(asked.body)), *shape))
     places = dict(zip(at.probes, map(Cell, where if shape else where.tolist()), strict=True))
-    here: dict[str, Value] = {name: places.get(name) or _still(env[name]) for name in asked.params}
+    here: dict[str, Value] = {name: places.get(name) or resting(env[name]) for name in asked.params}
     for number, cell in enumerate(numbers_at(asked, machine.with_directions(0).tracking(), here)):
         values[0, number], values[1, number] = cell.v, 0.0 if cell.e is None else cell.e
     both = np.moveaxis(values, 1, -1)
     return both[0] > 0, np.abs(both[0]) > CLEAR * both[1]
-
-
-def _still(value: Value) -> Value:
-    return Cell(value.v, value.e) if isinstance(value, Cell) else value
 
 
 def taken(plan: StepIntegral, choice: Choice[int], sides: Sides, passed: Passed) -> Ints:

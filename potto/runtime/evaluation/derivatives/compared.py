@@ -7,15 +7,16 @@ formula misses a part, and nothing is known of its derivative.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from potto.diagnostics import PottoError
-from potto.integrate.events import DISAGREE, Events
+from potto.integrate.events import DISAGREE
 from potto.integrate.pieces import still
 from potto.kernels.cells import Cell, Value, map_cells
 from potto.runtime.evaluation.functions import Closure, Derivative
 from potto.runtime.evaluation.machine import Groups, Machine
-from potto.runtime.evaluation.record import Record
 
 SLACK = 1e-8  # of the largest number of the first derivative, beyond what both ways admit
 
@@ -29,35 +30,31 @@ def compared(machine: Machine, inner: Derivative, groups: Groups, value: Value) 
     wrong, and the error of the second one without bound then."""
     if not (isinstance(value, tuple) and len(value) == 2) or machine.frozen or not machine.root:
         return value
-    other = machine.changed(events=Events(), record=Record(costs=None, gauge=machine.record.gauge))
-    try:
-        first = other.call(inner, tuple(tuple(map(_value, group)) for group in groups), None)
-    except (PottoError, _ByHand):
-        return value
-    finally:
-        machine.record.evaluations += other.record.evaluations
-    if other.record.shortfalls or _agree(value[0], first, SLACK * _largest(first)):
-        return value
-    machine.note(DISAGREE)
-    return first, _unknown(value[1])
+    first = _disagreeing(machine, inner, groups, _value, value[0])
+    return value if first is None else (first, _unknown(value[1]))
 
 
 def held(machine: Machine, first: Derivative, groups: Groups, value: Value) -> Value:
     """What the formula of a first derivative gives, with its tangents without bound where its value is wrong."""
     if machine.frozen or machine.taping or not machine.root or not machine.directions:
         return value
-    quiet = machine.with_directions(0)
-    other = quiet.changed(events=Events(), record=Record(costs=None, gauge=machine.record.gauge))
-    try:
-        found = other.call(first, tuple(tuple(map(still, group)) for group in groups), None)
-    except PottoError:
-        return value
-    finally:
-        machine.record.evaluations += other.record.evaluations
-    if other.record.shortfalls or _agree(value, found, SLACK * _largest(found)):
-        return value
+    found = _disagreeing(machine.with_directions(0), first, groups, still, value)
+    return value if found is None else map_cells(value, _with_unknown_tangents)
+
+
+def _disagreeing(
+    machine: Machine, first: Derivative, groups: Groups, plain: Callable[[Value], Value], formula: Value
+) -> Value | None:
+    """The first derivative as numbers find it, where a formula gives another one, which is noted; else None."""
+    with machine.unrecorded() as other:
+        try:
+            found = other.call(first, tuple(tuple(map(plain, group)) for group in groups), None)
+        except (PottoError, _ByHand):
+            return None
+    if other.record.shortfalls or _agree(formula, found, SLACK * _largest(found)):
+        return None
     machine.note(DISAGREE)
-    return map_cells(value, _with_unknown_tangents)
+    return found
 
 
 def _value(dual: Value) -> Value:

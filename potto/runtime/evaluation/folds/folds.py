@@ -15,14 +15,14 @@ import numpy as np
 from potto.calculus.inlining.reads import beside
 from potto.core.terms import Fold, Lam, Term, function_of, lam
 from potto.diagnostics import PottoError
-from potto.kernels.cells import Cell, Env, Number, Value, all_arrays, map_cells, pad, pattern
+from potto.kernels.cells import Cell, Env, Value, batch_shape, map_cells, pad, pattern
 from potto.kernels.native.stepping import Stepping
 from potto.kernels.whole import looked_through
 from potto.runtime.evaluation.folds.linear import States, along, steps_at_once
 from potto.runtime.evaluation.folds.reduction import reduced
 from potto.runtime.evaluation.folds.signed import can_be_sampled, stepped
 from potto.runtime.evaluation.machine import Machine
-from potto.runtime.evaluation.selection import Pick, apart
+from potto.runtime.evaluation.selection import by_bounds
 from potto.runtime.evaluation.sums import bounds
 
 STEPS = "steps"  # what a kernel's machine code for folds is kept under
@@ -33,7 +33,8 @@ def fold(machine: Machine, term: Fold, lo: Value, hi: Value, start: Value, env: 
     """The state after all steps, however many."""
     first, last = bounds(lo, "lower"), bounds(hi, "upper")
     if isinstance(first, np.ndarray) or isinstance(last, np.ndarray):
-        return _grouped(machine, term, first, last, start, env)
+        whole = {**env, "": pad(start, machine.directions)}
+        return by_bounds(first, last, whole, lambda a, b, here: fold(machine, term, a, b, here.pop(""), here))
     places = range(int(first), int(last) + 1)
     if not places:
         return start
@@ -64,7 +65,7 @@ def _read(machine: Machine, term: Fold, places: range, start: Value, env: Env) -
     """What a step does with what it reads of arrays, whatever the state is; what it reads in all steps, and in each:
     numbers with the steps as first axis."""
     step, accesses = beside(term.body, frozenset((term.state,)))
-    shape = np.broadcast_shapes(*(a.shape for value in (start, *env.values()) for a in all_arrays(value)))
+    shape = batch_shape((start, *env.values()))
     index = np.arange(places.start, places.stop, dtype=float).reshape(-1, *(1,) * len(shape))
     here = {**env, term.variable: Cell(index, None, (None,) * machine.directions)}
     known: Env = {}
@@ -150,23 +151,3 @@ def _carrying(machine: Machine, term: Fold, body: Lam, places: range, start: Val
         here[term.variable] = Cell(float(place), None, still)
         here[term.state] = machine.run(body, [here[name] for name in body.params], None)
     return here[term.state]
-
-
-def _grouped(machine: Machine, term: Fold, first: Number, last: Number, start: Value, env: Env) -> Value:
-    """Bounds that differ over the batch: the members with equal bounds together."""
-    whole = {**env, "": start}
-    shape = np.broadcast_shapes(
-        np.shape(first), np.shape(last), *(a.shape for value in whole.values() for a in all_arrays(value))
-    )
-    lo, hi = np.broadcast_to(first, shape), np.broadcast_to(last, shape)
-    pairs = np.unique(np.stack([lo.ravel(), hi.ravel()]), axis=1).T
-    whole[""] = pad(start, machine.directions)
-
-    def evaluated(number: int, here: Env, _: Pick) -> Value:
-        a, b = (Cell(float(end)) for end in pairs[number])
-        return fold(machine, term, a, b, here.pop(""), here)
-
-    return apart([(lo == a) & (hi == b) for a, b in pairs], whole, evaluated)
-
-
-__all__ = ["fold"]

@@ -16,7 +16,8 @@ import numpy as np
 from msgspec import Struct
 
 from potto.core.terms import Fold, Lam
-from potto.kernels.cells import Array, Cell, Env, Rows, Value, all_arrays, all_cells, map_cells, pad, pattern
+from potto.integrate.pieces import resting
+from potto.kernels.cells import Array, Cell, Env, Rows, Value, all_cells, batch_shape, pad, pattern
 from potto.kernels.tape import Node, linear
 from potto.kernels.whole import UNIT_ROUNDOFF, looked_through
 from potto.runtime.evaluation.folds.steps import carried, spread
@@ -33,7 +34,7 @@ def steps_at_once(machine: Machine, term: Fold, start: Value, env: Env) -> int:
     kinds = _sizes(start)
     if kinds is None or machine.linker.inexact(term.body) or any(map(_closed, env.values())):
         return 0
-    d, members = sum(kinds), int(np.prod(_shape(start, env)))
+    d, members = sum(kinds), int(np.prod(batch_shape((start, *env.values()))))
     return MOST_WORK // (d**3 * members) if 0 < d <= MOST_NUMBERS and members else 0
 
 
@@ -68,10 +69,6 @@ def _form(value: Value) -> Any:
     return (value.size, _form(value.item)) if isinstance(value, Rows) else None
 
 
-def _shape(state: Value, env: Env) -> Shape:
-    return np.broadcast_shapes(*(a.shape for value in (state, *env.values()) for a in all_arrays(value)))
-
-
 class States(Struct, frozen=True):
     """The states that were met. met: each number of them as each step began, (*inner, steps, *batch), where `inner` are
     the axes of places in arrays around it. last: the state after the last step."""
@@ -85,7 +82,7 @@ class States(Struct, frozen=True):
         """Of all states, one by one; None where they are not of one kind."""
         if any(_form(state) != _form(start) for state in (states[1], states[-1])):
             return None
-        shape = np.broadcast_shapes(_shape(states[-1], env), _shape(start, env))
+        shape = batch_shape((states[-1], start, *env.values()))
         cells = [[state] if isinstance(state, Cell) else all_cells(state) for state in states[:-1]]
         inner = enumerate(_inner(start, ()))
         return cls([_along([row[c].v for row in cells], own, shape) for c, own in inner], states[-1], shape)
@@ -93,7 +90,7 @@ class States(Struct, frozen=True):
     @classmethod
     def counted(cls, numbers: Sequence[Array], start: Value, env: Env) -> States:
         """Of numbers at the beginning and after each step, (1 + steps, *batch), of a state without arrays."""
-        shape = _shape(start, env)
+        shape = batch_shape((start, *env.values()))
         wide = [x.reshape(len(x), *(1,) * (len(shape) + 1 - x.ndim), *x.shape[1:]) for x in numbers]
         met = [np.broadcast_to(x, (len(x), *shape)) for x in wide]
         last = iter([Cell(x[-1] if shape else float(x[-1])) for x in met])
@@ -172,7 +169,7 @@ class _Steps:
     def rest(self, k: int) -> Env:
         if not self.machine.taping:
             return self.env
-        return {name: map_cells(value, lambda cell: Cell(cell.v, cell.e)) for name, value in self.env.items()}
+        return {name: resting(value) for name, value in self.env.items()}
 
     def state(self, off: Array | None, k: int, total: int) -> Value:
         """The states of all steps, each of their numbers moving in a direction of its own."""

@@ -15,7 +15,7 @@ from msgspec import Struct
 from potto.core.terms import Fold, Prim, Term, Var, const, lam, mul
 from potto.core.walking import substitute
 from potto.integrate.events import OneSidedDerivatives, TwoSided
-from potto.kernels.cells import Array, Cell, Env, Number, Value, all_arrays
+from potto.kernels.cells import Array, Cell, Env, Number, Value, batch_shape
 from potto.kernels.tape import Node, Untaped, linear
 from potto.kernels.whole import LARGEST, UNIT_ROUNDOFF, looked_through
 from potto.primitives import PRIMITIVES
@@ -31,7 +31,7 @@ def reduced(machine: Machine, term: Fold, places: range, start: Value, env: Env)
     if step is None or not isinstance(start, Cell):
         return None
     op, element = step
-    shape = np.broadcast_shapes(*(a.shape for v in (start, *env.values()) for a in all_arrays(v)))
+    shape = batch_shape((start, *env.values()))
     if len(places) * int(np.prod(shape)) > MOST_POINTS:
         return None
     body = lam(tuple(sorted(element.free | {term.variable})), element)

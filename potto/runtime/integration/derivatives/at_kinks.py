@@ -10,7 +10,7 @@ from msgspec.structs import replace
 
 from potto.core.terms import children
 from potto.integrate.degenerate.kinks import lying_along
-from potto.integrate.events import BOUNDLESS, Along, OneSidedDerivatives, SurfaceFold, TwoSided
+from potto.integrate.events import BOUNDLESS, Along, OneSidedDerivatives, SurfaceFold, TwoSided, mask_of
 from potto.integrate.pieces import Sums
 from potto.kernels.cells import Ints
 from potto.runtime.evaluation.derivatives.beside import parameter_step
@@ -42,8 +42,7 @@ def _surfaces(problem: Problem) -> list[tuple[TwoSided, Ints]]:
     """The surfaces that lie along a stretch, as quadrature has met them, each for members that none before it has."""
     met, found = np.zeros(problem.batch, dtype=bool), []
     for event, members in problem.events.every(Along):
-        mask = np.zeros(problem.batch, dtype=bool)
-        mask[slice(None) if members is None else members] = True
+        mask = mask_of(members, problem.batch)
         if (fresh := np.nonzero(mask & ~met)[0]).size:
             found.append((TwoSided(event.variable, event.surface, along=not event.bound), fresh))
         met |= mask

@@ -21,7 +21,6 @@ from potto.runtime.integration.problem import Problem
 MOST_LEVELS = 3
 PER_LEVEL, AFFORDABLE = 12, 1_000_000
 LOOSE = 1e-3
-SAMPLED = ("mc", "qmc")  # methods whose errors are no less for one summand than for many
 # A look takes as long as an answer by a plan of what has one, 10 ms; the plan takes twenty times that.
 SEEN, MOST_LOOKS = 2, 16
 MET = 4  # one in so many planes that may cut a variable does: half of what it takes to twice that, of polytopes
@@ -67,7 +66,7 @@ def to_be_seen(problem: Problem) -> Term | None:
     machine = problem.machine
     if problem.batch > 1 or not problem.outermost or machine.frozen or machine.side:
         return None
-    if machine.settings.method in SAMPLED or len(problem.term.variables) != SEEN:
+    if machine.settings.sampled or len(problem.term.variables) != SEEN:
         return None
     body = problem.unplanned(MOST_LOOKS)
     return body if body is not None and worth_a_look(body) else None

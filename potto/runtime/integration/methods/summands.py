@@ -19,14 +19,14 @@ from potto.core.terms import Const, Integral, Lam, Term, Var
 from potto.diagnostics import PottoError
 from potto.integrate.columns import distinct
 from potto.kernels import errors
-from potto.kernels.cells import Array, Bools, Cell, Number, Value, all_arrays, combined, map_arrays, pad
+from potto.kernels.cells import Array, Bools, Cell, Number, Value, batch_shape, combined, map_arrays, pad
 from potto.kernels.tape import Node
 from potto.kernels.whole import PAIRWISE, ROUNDING
+from potto.projects.settings import SAMPLERS
 from potto.runtime.answers.allowances import NOTHING
 from potto.runtime.evaluation.functions import Closure, Derivative
 from potto.runtime.evaluation.machine import Machine
 from potto.runtime.evaluation.sums import CHUNK
-from potto.runtime.integration.methods.choices import SAMPLED
 from potto.runtime.integration.problem import linked
 
 Slots = tuple[int, ...]  # the directions in which a member moves
@@ -118,7 +118,7 @@ def _together(
     machine: Machine, batch: SummandBatch, env: dict[str, Value], parts: list[Value], left: list[int]
 ) -> None:
     """Put sums over the members, so many at a time, and the places of those that are to be evaluated as written."""
-    shape = np.broadcast_shapes(*(a.shape for value in env.values() for a in all_arrays(value)))
+    shape = batch_shape(env.values())
     step = max(1, CHUNK // max(1, int(np.prod(shape))))
     for start in range(0, len(batch.places), step):
         chunk = batch.part(slice(start, start + step))
@@ -160,7 +160,7 @@ def _evaluated(
     parts = _Parts(value, (*shape, size), slots, machine)
     whole = parts.total(~bad)
     lacking = parts.lacking(whole, machine.rtol, allowed.most) & ~bad
-    if record.methods.isdisjoint(SAMPLED) and lacking.any():
+    if record.methods.isdisjoint(SAMPLERS) and lacking.any():
         bad |= lacking
         if bad.all():
             return None, bad

@@ -31,8 +31,8 @@ from potto.core.terms import (
     function_of,
     postorder,
     proj,
+    replaced,
     substitute,
-    transform,
     tuple_,
     var,
 )
@@ -166,9 +166,9 @@ def _in_turn(accesses: tuple[Access, ...]) -> tuple[tuple[str, Term], ...]:
     for node in sorted(shared, key=lambda node: len(postorder(node))):
         name = fresh("place", taken)
         taken.add(name)
-        found.append((name, _by_names(node, names)))
+        found.append((name, replaced(node, names)))
         names[node] = var(name)
-    return (*found, *((access.name, _by_names(access.term, names)) for access in accesses))
+    return (*found, *((access.name, replaced(access.term, names)) for access in accesses))
 
 
 def _surely(term: Term) -> list[Term]:
@@ -178,10 +178,6 @@ def _surely(term: Term) -> list[Term]:
         return children(node)[:-2] if isinstance(node, If | Branch) else () if bound_names(node) else children(node)
 
     return postorder(term, below=below)
-
-
-def _by_names(term: Term, names: dict[Term, Term]) -> Term:
-    return transform(term, lambda node, new: names.get(node, new), lambda node: () if node in names else children(node))
 
 
 def _parts_of(term: Term, name: str, value: Value) -> Read:

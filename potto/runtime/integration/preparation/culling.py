@@ -17,7 +17,7 @@ from potto.core.terms import Index, Integral, Prim, Sum, Term, Var, function_of,
 from potto.diagnostics import PottoError
 from potto.integrate.decomposition.culling import Pairs, culls, remaining
 from potto.integrate.pieces import still
-from potto.kernels.cells import Array, Cell, Env, Ints, Rows, Value, all_arrays, map_arrays, map_cells
+from potto.kernels.cells import Array, Cell, Env, Ints, Rows, Value, all_arrays, batch_shape, map_arrays, map_cells
 from potto.kernels.making import making
 from potto.kernels.tape import Edge, Node
 from potto.kernels.whole import PAIRWISE
@@ -36,7 +36,7 @@ PAIRS = 1 << 17  # evaluated together
 
 def culled(machine: Machine, term: Sum, first: int, last: int, env: Env) -> Value | None:
     """The sum over the pairs that may be something; None where that cannot be told, or is most of them."""
-    shape = np.broadcast_shapes(*(a.shape for value in env.values() for a in all_arrays(value)))
+    shape = batch_shape(env.values())
     members, count = int(np.prod(shape)), last - first + 1
     if not machine.root or members * count < FEW:
         return None

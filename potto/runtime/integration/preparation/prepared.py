@@ -132,11 +132,7 @@ def placed(term: Integral, again: bool, reach: Reach) -> Integral:
 
 def _with_deltas(term: Integral, change: Callable[[Delta], Term]) -> Integral:
     """The integral with its deltas changed, those further in first."""
-    memo: dict[Term, Term] = {}
-    for node in postorder(term):
-        new = rebuild(node, tuple(memo[child] for child in children(node)))
-        memo[node] = change(new) if isinstance(new, Delta) else new
-    found = memo[term]
+    found = transform(term, lambda _, new: change(new) if isinstance(new, Delta) else new)
     assert isinstance(found, Integral)
     return found
 
@@ -276,7 +272,6 @@ def held(term: Integral) -> tuple[Integral, tuple[tuple[str, str], ...]]:
     names = sorted({name for node in deltas for name in node.coordinates[0].free} - bound)
     renamed = {name: var(f"{name}@still") for name in names}
     result = _with_deltas(term, lambda delta: substitute(delta, renamed))
-    assert isinstance(result, Integral)
     return result, tuple((name, f"{name}@still") for name in names)
 
 
