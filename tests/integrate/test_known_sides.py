@@ -100,6 +100,19 @@ def test_after_many_sides_the_whole_is_made(tmp_path: Path, swept):
     assert max(swept) == 20
 
 
+def test_of_many_sides_that_come_to_one_integral_it_is_made_once(tmp_path: Path, swept):
+    """Six conditions have 64 sets of sides: all but one leave nothing."""
+    conditions = " * ".join(f"[u^3 + u^5 + u^7 < t{n}]" for n in range(6))
+    names = ", ".join(f"t{n}" for n in range(6))
+    file = tmp_path / "one.po"
+    file.write_text(f"def f({names}) integral [0, 1] {conditions} * u d(u)\n")
+    function = potto.load(file).f
+    for n in range(1, 64):
+        assert float(function(*(-1.0 if n >> k & 1 else 4.0 for k in range(6)))) == 0
+    assert not any(swept)
+    assert float(function(*[4.0] * 6)) == pytest.approx(0.5, rel=1e-14)
+
+
 def test_few_members_are_each_on_their_sides(module):
     """Dark, bright and cut ones in one batch: by the bounds of x the integral of u, and how long it is."""
     low = [0.0, 3.0, 1.5]

@@ -167,6 +167,19 @@ def test_triangles_hide_each_other(at: tuple[float, float]) -> None:
     agrees(found(HIDDEN, "picture", "z", 5.0, at), exact, 1e-8)
 
 
+def test_pixels_of_triangles_that_hide_each_other_are_taken_together() -> None:
+    """What hides a triangle of itself is defined nowhere, so that the pixels need no search: four times as many, of the
+    same scene, do not ask kernels twice as often."""
+
+    def asked(count: int) -> int:
+        x, y = (of.ravel() for of in np.meshgrid(*[np.linspace(-0.55, 0.55, count)] * 2))
+        seen = potto.deriv(HIDDEN.picture)(x, y, dz=(4.9, 1.0))
+        assert np.all(seen.converged)
+        return int(seen.stats["kernels compiled"] + seen.stats["kernels reused"])
+
+    assert asked(12) < 2 * asked(6)
+
+
 @pytest.mark.parametrize("at", [(0.066 + 0.27, 0.033), (0.066, 0.033 - 0.27), (-0.12, 0.22), (0.05, 0.05)])
 def test_the_silhouette_of_a_sphere(at: tuple[float, float]) -> None:
     def area(r: Any) -> Any:

@@ -88,10 +88,16 @@ def _left(places: Places, v: Array, e: Array, covers: Sequence[int]) -> Places:
 
 
 def _pairs(v: Array) -> tuple[Ints, Ints, Ints]:
-    """Each two surfaces of each member, and whose they are."""
+    """Each two surfaces of each member, and whose they are; without those that cross nothing: they are 0 everywhere, or
+    defined nowhere, as what a primitive of a scene hides of itself may be."""
     _, count, batch = v.shape
     p, q = (np.repeat(of, batch) for of in np.triu_indices(count, 1))
-    return p, q, np.tile(np.arange(batch), p.size // batch)
+    owner = np.tile(np.arange(batch), p.size // batch)
+    bare = ~v.any(axis=0) | np.isnan(v).any(axis=0)
+    if bare.any():
+        there = ~(bare[p, owner] | bare[q, owner])
+        p, q, owner = p[there], q[there], owner[there]
+    return p, q, owner
 
 
 def _bounds_both(v: Array, e: Array, places: Places, polynomial: Lam, machine: Evaluator) -> Bools:

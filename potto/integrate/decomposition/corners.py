@@ -21,11 +21,12 @@ from potto.integrate.columns import distinct, side_by_side
 from potto.integrate.decomposition.conic_corners import BESIDE, CLEAR, Places, conic_corners, mixed_corners, moving
 from potto.integrate.decomposition.critical_places import common_places
 from potto.integrate.decomposition.meetings import Row, as_array, tangents
+from potto.integrate.degenerate.undefined import LOOKED_AT
 from potto.integrate.events import Unsearched
 from potto.integrate.levels import Corners, LevelPlan
 from potto.integrate.pieces import Evaluator, gather, numbers_at
 from potto.integrate.rules.gauss import EPS
-from potto.kernels.cells import Array, Cell, Ints, Number, Value
+from potto.kernels.cells import Array, Bools, Cell, Ints, Number, Value
 
 ROUNDED = 2 * EPS  # of the sizes of its summands: how far off a sum of products is
 FINEST = 4 * EPS**2  # the same with what rounding took from each product
@@ -107,7 +108,7 @@ def corner_rows(
     span = as_array(np.minimum(lo.v, hi.v), batch), as_array(np.maximum(lo.v, hi.v), batch)
     for region in level.corners:
         numbers = _numbers(numbers_at(region.numbers, machine.tracking(), env), batch, machine.directions)
-        unknown = ~np.isfinite(numbers[0][: 3 * region.lines - 6]).all(axis=0)
+        unknown = _unknown(region, numbers[0], level.variable, span, env, machine)
         if unknown.any():
             machine.note(Unsearched(level.variable), np.nonzero(unknown)[0])
         lines = _Lines(*(_apart(of[..., : 3 * region.lines, :], 3) for of in numbers)).in_order()
@@ -127,6 +128,29 @@ def corner_rows(
                        for of, gap in ((x, np.nan), (e, 0.0), (t, 0.0), (et, 0.0)))  # fmt: skip
         rows += [Row(x[i], tuple(t[:, i]), region.cut, False, e[i], tuple(et[:, i])) for i in range(x.shape[0])]
     return rows
+
+
+def _unknown(
+    region: Corners, v: Array, variable: str, span: tuple[Array, Array], env: dict[str, Value], machine: Evaluator
+) -> Bools:
+    """The members of which a line or a conic is not known, though its surface is defined: what a scene's primitive
+    hides of itself, say, is defined nowhere, and cuts nothing."""
+    flat, batch = 3 * region.lines, v.shape[1]
+    lines, conics = v[: flat - 6].reshape(-1, 3, batch), v[flat:].reshape(-1, 6, batch)
+    low, high = -v[flat - 4], v[flat - 1]  # of the last two, y - low and high - y
+    missing = np.concatenate([~np.isfinite(of).all(axis=1) for of in (conics, lines)])
+    some = np.nonzero(missing.any(axis=0))[0]
+    unknown = np.zeros(batch, dtype=bool)
+    if some.size:
+        here, still = gather(env, some), machine.with_directions(0)
+        defined = np.zeros((missing.shape[0], some.size), dtype=bool)
+        for share in LOOKED_AT:
+            for name, (a, b) in ((variable, span), (region.within.variable, (low, high))):
+                here[name] = Cell((share * a + (1 - share) * b)[some])
+            found = numbers_at(region.surfaces, still, here)[:-2]
+            defined |= np.stack([~np.isnan(as_array(cell.v, some.size)) for cell in found])
+        unknown[some] = (missing[:, some] & defined).any(axis=0)
+    return unknown
 
 
 def _touching(

@@ -153,7 +153,7 @@ def along_cuts(problem: Problem) -> Sums:
         if at_once and most is not None and found.stopped and uncertainty(found.sums) < PROMISING:
             found = best((found, attempted(problem, order, LONGER * max(most, found.taken))))
         along = found.events.every(Degenerate)
-        if not along and not found.stopped and (most is None or uncertainty(found.sums) < math.inf):
+        if not along and not found.stopped and (most is None or found.known):
             return finished(problem, found)
         if not along:
             stopped.append(found)

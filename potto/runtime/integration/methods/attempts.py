@@ -69,6 +69,12 @@ class Attempt(Struct, frozen=True):
     tabled: bool = False
     taken: int = 0
 
+    @property
+    def known(self) -> bool:
+        """Whether there is a bound of how far off it is; where no cell has anything in it, it is 0 exactly."""
+        empty = not self.taken and not self.sums.e.any() and not self.sums.et.any()
+        return empty or uncertainty(self.sums) < math.inf
+
 
 def attempted(problem: Problem, order: Integral, most: int | None) -> Attempt:
     """What quadrature in an order of the variables comes to with so many evaluations a member; None: with all."""

@@ -38,7 +38,8 @@ from potto.core.terms import (
 from potto.integrate.rules.intervals import Interval, enclosure
 from potto.kernels.cells import Cell, Value
 
-MOST_SIDES = 12  # of one integral, that are told apart
+MOST_LEFT = 16  # integrals that are made of one; each takes as long as the whole would with so few surfaces
+MOST_SIDES = 4096  # combinations of sides of one integral of which it is kept what is left
 MOST_VARIABLES = 3
 MOST_PARTS = 2000  # of an integrand with calls carried out
 # Surfaces of so few parts are swept as quickly as looked at. So many are not looked at each time: 90 half planes take
@@ -52,25 +53,38 @@ class Sided(Struct):
     """An integral, its integrand with calls of functions that jump carried out.
 
     surfaces: those whose sides can be told, by all calls in them carried out; `ends`: where these stop being defined.
-    flat: whether all are affine in each variable by itself. met: what is left of the integral, by the sides on which
-    all of it lies.
+    flat: whether all are affine in each variable by itself. met: what is taken for the integral, by the sides on which
+    all of it lies. left: each of these, and sides that are enough for it.
     """
 
     term: Integral
     surfaces: dict[Term, Term]
     ends: dict[Term, tuple[Term, ...]]
     flat: bool
-    met: dict[tuple[Side, ...], Integral] = {}
+    met: dict[tuple[Side, ...], Integral | None] = {}
+    left: dict[Integral, frozenset[Side]] = {}
 
     def at(self, env: dict[str, Value]) -> Integral | None:
-        """What is left of it at these parameters; None if that is all, or more sides were met than are told apart."""
+        """What is left of it at these parameters; None if that is all, or is not told apart from others."""
         sides = tuple(self._sides(env))
-        found = self.met.get(sides)
-        if found is None and sides and len(self.met) < MOST_SIDES:
-            body = _taken(self.term.body, dict(sides))
-            found = integral(self.term.variables, self.term.bounds, body, self.term.hints)
-            self.met[sides] = found
-        return found
+        if sides not in self.met:
+            if len(self.met) >= MOST_SIDES:
+                return self._known(frozenset(sides))
+            self.met[sides] = self._without(sides) if sides else None
+        return self.met[sides]
+
+    def _without(self, sides: tuple[Side, ...]) -> Integral | None:
+        body = _taken(self.term.body, dict(sides))
+        found = integral(self.term.variables, self.term.bounds, body, self.term.hints)
+        if found in self.left or len(self.left) < MOST_LEFT:
+            self.left.setdefault(found, frozenset(sides))
+            return found
+        return self._known(frozenset(sides))
+
+    def _known(self, sides: frozenset[Side]) -> Integral | None:
+        """Of the integrals that are made the one with the fewest surfaces that is right on these sides."""
+        right = [found for found, enough in self.left.items() if enough <= sides]
+        return max(right, key=lambda found: len(self.left[found]), default=None)
 
     def _sides(self, env: dict[str, Value]) -> Iterator[Side]:
         """The surfaces of which all of the box lies on one side, and whether that is the upper one."""
