@@ -6,7 +6,6 @@ an answer, and what was met on the way to it, to one that is no worse; each says
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
