@@ -93,7 +93,7 @@ def _pairs(v: Array) -> tuple[Ints, Ints, Ints]:
     _, count, batch = v.shape
     p, q = (np.repeat(of, batch) for of in np.triu_indices(count, 1))
     owner = np.tile(np.arange(batch), p.size // batch)
-    bare = ~v.any(axis=0) | np.isnan(v).any(axis=0)
+    bare: Bools = ~v.any(axis=0) | np.isnan(v).any(axis=0)
     if bare.any():
         there = ~(bare[p, owner] | bare[q, owner])
         p, q, owner = p[there], q[there], owner[there]
