@@ -52,7 +52,7 @@ def conic_corners(lines: Sequence[Array], conics: Sequence[Array], span: tuple[A
     """
     with np.errstate(all="ignore"):
         v, e = (_joined(of, more) for of, more in zip(lines, conics, strict=True))
-        p, q, owner = _pairs(v)
+        p, q, owner = _pairs(v, e)
         bent = p < conics[0].shape[1]
         places = _conic_crossings(v, e, p[bent], q[bent], owner[bent], span)
         return _left(places, v, e, (-1,) * v.shape[1])
@@ -66,7 +66,7 @@ def mixed_corners(
     `ConicRegion`. Of n in a union n^2/2 cross, and few of these are within none of the others."""
     with np.errstate(all="ignore"):
         v, e = (_joined(of, more) for of, more in zip(lines, conics, strict=True))
-        p, q, owner = _pairs(v)
+        p, q, owner = _pairs(v, e)
         bent = p < conics[0].shape[1]
         places = joined([_conic_crossings(v, e, p[bent], q[bent], owner[bent], span),
                          _straight_crossings(v[3:], e[3:], p[~bent], q[~bent], owner[~bent])])  # fmt: skip
@@ -87,13 +87,13 @@ def _left(places: Places, v: Array, e: Array, covers: Sequence[int]) -> Places:
     return places
 
 
-def _pairs(v: Array) -> tuple[Ints, Ints, Ints]:
-    """Each two surfaces of each member, and whose they are; without those that cross nothing: they are 0 everywhere, or
-    defined nowhere, as what a primitive of a scene hides of itself may be."""
+def _pairs(v: Array, e: Array) -> tuple[Ints, Ints, Ints]:
+    """Each two surfaces of each member, and whose they are; without those that cross nothing: they are 0 everywhere for
+    certain, or defined nowhere, as what a primitive of a scene hides of itself may be."""
     _, count, batch = v.shape
     p, q = (np.repeat(of, batch) for of in np.triu_indices(count, 1))
     owner = np.tile(np.arange(batch), p.size // batch)
-    bare: Bools = ~v.any(axis=0) | np.isnan(v).any(axis=0)
+    bare = ((v == 0) & (e == 0)).all(axis=0) | (v != v).any(axis=0)
     if bare.any():
         there = ~(bare[p, owner] | bare[q, owner])
         p, q, owner = p[there], q[there], owner[there]
