@@ -23,6 +23,7 @@ from potto.calculus.surfaces.case_split import by_extremes
 from potto.calculus.surfaces.finding import Finding, Resolve
 from potto.core.packing import packed
 from potto.core.terms import Integral, Lam, Term, function_of, tuple_
+from potto.integrate.decomposition.arrangements import Arrangement, arrangement_of
 from potto.integrate.decomposition.vanishing import Vanishing, held, vanishing_of
 from potto.integrate.levels import Group, LevelPlan, group_levels
 
@@ -39,6 +40,7 @@ class Outline(Struct, frozen=True, dict=True):
     folds: whether a surface that is searched for may have folds where the variables further out can't be cut.
     kinks: what is 0 where builtins have kinks, as one tuple, without what is known to be 0 at single places alone;
     the last of them, so many as there are steps, where what parameters alone decide changes.
+    arrangement: of the surfaces that decide, where it is to be told at which places they leave something.
     """
 
     term: Integral
@@ -52,6 +54,7 @@ class Outline(Struct, frozen=True, dict=True):
     folds: bool = False
     kinks: Lam = NO_KINKS
     steps: int = 0
+    arrangement: Arrangement | None = None
 
     @cached_property
     def packed(self) -> bytes:
@@ -98,6 +101,7 @@ def outlined(
         return held(vanishing_of(term.body, paths, resolve=resolve))
 
     levels, groups = group_levels(sweep(term, found, resolve, findings, True, over, holds).levels)
+    searched = any(own.level.critical for own in levels)
     numbers = {j.path: (g.number, j.orientation) for g in groups for j in g.cut.jumps}
     return Outline(
         term,
@@ -110,6 +114,7 @@ def outlined(
         _doublings(term, found),
         _may_fold(term, levels),
         *_kinks(term, found, findings, mixed),
+        arrangement_of(term.body, groups, resolve) if over is None and searched else None,
     )
 
 

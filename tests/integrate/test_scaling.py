@@ -12,6 +12,7 @@ from typing import Any
 
 import pytest
 from call_counts import calls_in
+from spheres import directions
 
 import potto
 from potto.core.terms import Lam
@@ -111,14 +112,6 @@ def weighted_discs(n: int) -> tuple[str, dict[str, float]]:
     discs = (f"{k}*[(x - ({0.3 * math.cos(a)!r}))^2 + (y - ({0.3 * math.sin(a)!r}))^2 < t^2]"
              for k, a in enumerate((2 * math.pi * (k + 0.3) / n for k in range(n)), 1))  # fmt: skip
     return f"def f(t) integral ([-2, 2], [-2, 2]) ({' + '.join(discs)})/(3 + x) d(x, y)", {"t": 0.7}
-
-
-def directions(n: int) -> list[tuple[float, float, float]]:
-    """Points all over the unit sphere, none of them along an axis."""
-    heights = (1 - 2 * (k + 0.37) / n for k in range(n))
-    around = (2.399963 * k + 0.2 for k in range(n))
-    return [(math.sqrt(1 - z * z) * math.cos(a), math.sqrt(1 - z * z) * math.sin(a), z)
-            for z, a in zip(heights, around, strict=True)]  # fmt: skip
 
 
 def weighted_planes(n: int) -> tuple[str, dict[str, float]]:

@@ -1,7 +1,7 @@
 """How high the degree of an integrand is in its variables, between the surfaces that cut it.
 
-Owns `degree` and `plane`. A Gauss rule with n nodes is exact up to degree 2n - 1: of a length, an area or a volume one
-node along the innermost variable says everything.
+Owns `degree`, `plane` and `quadric`. A Gauss rule with n nodes is exact up to degree 2n - 1: of a length, an area or a
+volume one node along the innermost variable says everything.
 """
 
 from __future__ import annotations
@@ -35,9 +35,18 @@ def _known(names: frozenset[str]) -> Kept[int | None]:
 def plane(term: Term, variables: Iterable[str]) -> bool:
     """Whether a term is affine in some variables together, without sides, by its form."""
     names = frozenset(variables)
-    steady = all(names.isdisjoint(n.free) or isinstance(n, Var) or (isinstance(n, Prim) and n.op in _ARITHMETIC)
-                 for n in postorder(term))  # fmt: skip
-    return steady and degree(term, names) in (0, 1)
+    return _steady(term, names, _ARITHMETIC) and degree(term, names) in (0, 1)
+
+
+@lru_cache(maxsize=4096)
+def quadric(term: Term, names: frozenset[str]) -> bool:
+    """Whether a term is a polynomial of degree 2 at most in some variables together, without sides, by its form."""
+    return _steady(term, names, _ARITHMETIC | {"pow"}) and degree(term, names) in (0, 1, 2)
+
+
+def _steady(term: Term, names: frozenset[str], allowed: frozenset[str]) -> bool:
+    return all(names.isdisjoint(n.free) or isinstance(n, Var) or (isinstance(n, Prim) and n.op in allowed)
+               for n in postorder(term))  # fmt: skip
 
 
 def value_parts(node: Term) -> Sequence[Term]:

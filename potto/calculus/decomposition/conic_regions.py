@@ -1,8 +1,8 @@
 """Regions that lines and conics bound, intersections, unions and whatever is made of both: their corners.
 
-Owns `conic_region`. Of n lines and conics in a plane n^2/2 pairs cross; what lies outside of what is integrated, or
-within a union of others, leaves nothing that is not smooth. Which crossings those are the parameters decide, so numbers
-find them (`integrate/decomposition/corners`).
+Owns `conic_region`, and `covering`. Of n lines and conics in a plane n^2/2 pairs cross; what lies outside of what is
+integrated, or within a union of others, leaves nothing that is not smooth. Which crossings those are the parameters
+decide, so numbers find them (`integrate/decomposition/corners`).
 """
 
 from __future__ import annotations
@@ -38,6 +38,19 @@ def conic_region(
     return some or _region([cut for cut in flat if cut.holds], within, names, None) or (None, ([], []), {})
 
 
+def covering(cuts: Sequence[Cut], polynomial: Polynomial) -> Covers:
+    """Which surfaces leave nothing to the others on one of their sides, whatever they are; nothing where none does."""
+    flat = [cut for cut in cuts if cut.product is None and (cut.holds or not (cut.bends or cut.steps))]
+    if len(flat) < 2 or (by_sides := polynomial(_sides(flat))) is None:
+        return {}
+    settled = settling(by_sides, [side(n) for n in range(len(flat))])
+    return {cut: settled.get(side(n), 0) for n, cut in enumerate(flat)} if settled else {}
+
+
+def _sides(cuts: Sequence[Cut]) -> Sides:
+    return {jump.path: (side(n), jump.orientation) for n, cut in enumerate(cuts) for jump in cut.jumps}
+
+
 def _region(
     cuts: Sequence[Cut], within: Within, names: Sequence[str], polynomial: Polynomial | None
 ) -> tuple[ConicRegion, Edges, Covers] | None:
@@ -57,8 +70,7 @@ def _region(
     if all(cut.holds for cut in edges):
         lines, conics = ({cut: _turned(cut, of[cut]) for cut in of} for of in (lines, conics))
     else:
-        sides = {jump.path: (side(n), jump.orientation) for n, cut in enumerate(edges) for jump in cut.jumps}
-        if polynomial is None or (by_sides := polynomial(sides)) is None:
+        if polynomial is None or (by_sides := polynomial(_sides(edges))) is None:
             return None
         settled = settling(by_sides, [side(n) for n in range(len(edges))])
         covers = {cut: settled.get(side(n), 0) for n, cut in enumerate(edges)} if settled else {}

@@ -15,6 +15,7 @@ from functools import lru_cache
 from msgspec import Struct
 
 from potto.calculus.algebra.affine import determinant
+from potto.calculus.algebra.degree import quadric
 from potto.calculus.algebra.point_values import not_zero, sample_value
 from potto.calculus.algebra.radicals import squared
 from potto.calculus.algebra.ranges import range_of, vanishing
@@ -104,14 +105,15 @@ def scattered(surface: Term, variable: str, further: frozenset[str]) -> bool:
 
 
 def shadows(
-    found: Sequence[Critical], variable: str, lo: Term, hi: Term, roots: Sequence[Term], searched: Sequence[Term]
+    found: Sequence[Critical], here: Within, names: frozenset[str], roots: Sequence[Term], searched: Sequence[Term]
 ) -> Iterator[Critical]:
     """What the critical places along one variable leave in those further out: where they meet its bounds, turn, or meet
     a third surface at one place further in. What meets them elsewhere further in adds up with them, smoothly.
 
-    roots, searched: places and surfaces that cut the variable as bounds do.
+    roots, searched: places and surfaces that cut the variable as bounds do. names: the variables of integration. Where
+    a silhouette touches an edge nothing happens, but where a surface has edges of its own it may.
     """
-    here = Within(variable, lo, hi)
+    variable, lo, hi = here.variable, here.lo, here.hi
     known = dict.fromkeys(found)
     for system in found:
         for place in (*(bound for bound in (lo, hi) if not infinite(bound)), *roots):
@@ -124,12 +126,15 @@ def shadows(
         within = (*system.within, here)
         for turn in _turns(system, variable):
             yield Critical((*system.equations, turn), within, True)
-        for slope in _slopes(system):
+        smooth = all(quadric(surface, names) for surface in system.equations)
+        for slope in () if smooth else _slopes(system):
             yield Critical((*system.equations, slope), within)
         for surface in searched:
             if surface not in system.equations:
                 yield Critical((*system.equations, surface), within, system.turning)
         for other in known:
+            if smooth and (system.turning or other.turning):
+                continue
             union = tuple(dict.fromkeys((*system.equations, *other.equations)))
             if other.within == system.within and len(union) == len(system.equations) + 1:
                 yield Critical(union, within)

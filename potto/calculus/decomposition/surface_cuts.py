@@ -15,6 +15,8 @@ from msgspec.structs import replace
 from potto.calculus.algebra.radicals import minus
 from potto.calculus.algebra.ranges import positive
 from potto.calculus.decomposition.critical import Within
+from potto.calculus.decomposition.strata import MOST as MOST_STRATA
+from potto.calculus.decomposition.strata import Stratum
 from potto.calculus.solving.enclosable import slope_of
 from potto.calculus.solving.solve import Family, Sections, Unsolvable, sections, shared_factors
 from potto.core.simplify import normalized_surface
@@ -54,6 +56,7 @@ class Cut(Struct, frozen=True):
     covers: 1 or -1 where on that side of the canonical form nothing jumps at any cut that has this, 0 for one that is
         but covered by others.
     corners: the region whose corners it stands for, instead of a surface.
+    strata: where in space it comes from; none where that is not known.
     """
 
     surface: Term
@@ -69,6 +72,7 @@ class Cut(Struct, frozen=True):
     bends: bool = False
     covers: int | None = None
     corners: ConicRegion | None = None
+    strata: tuple[Stratum, ...] = ()
 
     @property
     def decides(self) -> bool:
@@ -111,7 +115,9 @@ def side(number: int) -> str:
 
 
 class Placed(Struct):
-    """A surface, what it is a product of (up to `sign`), and what is known of it. holds, bends: as a cut has them."""
+    """A surface, what it is a product of (up to `sign`), and what is known of it. holds, bends: as a cut has them.
+    strata: where it comes from, of each way in which it was met; nothing in one of them is not known.
+    """
 
     face: WrittenSurface
     factors: tuple[WrittenSurface, ...]
@@ -121,6 +127,13 @@ class Placed(Struct):
     steps: bool = False
     holds: int = 0
     bends: bool = False
+    strata: list[tuple[Stratum, ...]] = []
+
+    @property
+    def origin(self) -> tuple[Stratum, ...]:
+        """All strata that it comes from; none where that is not known, or they are many."""
+        found = dict.fromkeys(stratum for strata in self.strata for stratum in strata)
+        return tuple(found) if all(self.strata) and len(found) <= MOST_STRATA else ()
 
 
 @lru_cache(maxsize=8192)
@@ -150,11 +163,13 @@ def cut_of(placed: Placed, variable: str) -> Cut:
     for part in here:
         found = all_sections(part, variable)
         if found is None:
-            return Cut(surface, key, jumps, turning, None, (), steps, product, holds=placed.holds, bends=placed.bends)
+            return Cut(surface, key, jumps, turning, None, (), steps, product, holds=placed.holds, bends=placed.bends,
+                       strata=placed.origin)  # fmt: skip
         roots.update(dict.fromkeys((*found.roots, *found.poles)))
         families.update(dict.fromkeys((*found.families, *found.pole_families)))
     sections = tuple(roots), tuple(families)
-    return Cut(surface, key, jumps, turning, *sections, steps, product, holds=placed.holds, bends=placed.bends)
+    return Cut(surface, key, jumps, turning, *sections, steps, product, holds=placed.holds, bends=placed.bends,
+               strata=placed.origin)  # fmt: skip
 
 
 def all_sections(part: WrittenSurface, variable: str) -> Sections | None:

@@ -15,10 +15,11 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from potto.calculus.algebra.rational_form import settled
-from potto.calculus.decomposition.conic_regions import Polynomial, conic_region
+from potto.calculus.decomposition.conic_regions import Polynomial, conic_region, covering
 from potto.calculus.decomposition.critical import Critical, Within
-from potto.calculus.decomposition.projection import crossing, further_systems, shadows_of_cuts, shadows_of_roots
+from potto.calculus.decomposition.projection import Here, crossing, further_systems, shadows_of_cuts, shadows_of_roots
 from potto.calculus.decomposition.side_polynomials import by_sides
+from potto.calculus.decomposition.strata import Stratum, own
 from potto.calculus.decomposition.surface_cuts import (
     MOST_CENTERS,
     ConicRegion,
@@ -70,6 +71,7 @@ class _Pool(Struct):
     critical: dict[Critical, None] = {}
     edges: dict[Term, None] = {}
     corners: list[ConicRegion] = []
+    within: list[Within] = []  # the variables that were swept, with their bounds
 
     def find(self, finding: Finding) -> None:
         if finding.critical is not None:
@@ -79,11 +81,11 @@ class _Pool(Struct):
         elif finding.kind != "step":  # no variable takes part in it
             surface = settled(finding.surface, frozenset(self.variables))
             jump = (finding.path, finding.strict) if finding.kind == "jump" else None
-            self.put(surface, jump, finding.kind == "edge", bends=finding.kind != "jump")
+            self.put(surface, jump, finding.kind == "edge", bends=finding.kind != "jump", strata=own(surface))
 
     def put(
         self, surface: Term, jump: tuple[tuple[int, ...], bool] | None, turning: bool, steps: bool = False,
-        bends: bool = False,
+        bends: bool = False, strata: tuple[Stratum, ...] = (),
     ) -> None:  # fmt: skip
         face, orientation = face_of(surface)
         if not face.key.free:
@@ -96,6 +98,7 @@ class _Pool(Struct):
         placed.turning |= turning
         placed.steps |= steps
         placed.bends |= bends
+        placed.strata.append(strata)
 
     def hold(self, holds: Holds) -> None:
         """Note the sides outside of which nothing is integrated."""
@@ -111,7 +114,8 @@ class _Pool(Struct):
         for placed in taken:
             for factor in placed.factors:
                 if variable not in factor.key.free:
-                    self.put(factor.form, None, placed.turning, bool(placed.jumps) or placed.steps)
+                    steps = bool(placed.jumps) or placed.steps
+                    self.put(factor.form, None, placed.turning, steps, strata=own(factor.form))
         return taken
 
     def take_points(self, variable: str) -> tuple[list[Term], tuple[Critical, ...]]:
@@ -171,7 +175,7 @@ def sweep(
         for bound in bounds:
             for finding in findings(bound):
                 if finding.kind == "jump":
-                    pool.put(finding.surface, None, False)
+                    pool.put(finding.surface, None, False, strata=own(finding.surface))
                 elif finding.kind != "center":
                     pool.find(finding)
     return Sweep(tuple(reversed(levels)), pool.left())
@@ -191,28 +195,33 @@ def _level(
     region, (lines, conics), covers = conic_region(decisive, within, further, polynomial)
     alone = [cut for cut in decisive if cut not in lines and cut not in conics]
     complete = len(others) <= MOST_CUTS and crossing((*alone, *others), variable, further)[1]
+    pool.within.append(within)
+    here = Here(tuple(pool.within), further, nearest, frozenset(pool.variables))
     cuts = (*decisive, *others[:MOST_CUTS])
-    (here, systems), edges = pool.take_points(variable), pool.take_edges(variable)
-    own = None if over is None else cut_along(over.surface, variable)
+    (centers, systems), edges = pool.take_points(variable), pool.take_edges(variable)
+    along_own = None if over is None else cut_along(over.surface, variable)
     if not last:
-        if over is None or own is None:
-            shadows = shadows_of_cuts((*alone, *others[:MOST_CUTS]), (lines, conics), within, further, nearest)
+        if over is None or along_own is None:
+            shadows = shadows_of_cuts((*alone, *others[:MOST_CUTS]), (lines, conics), here)
         else:
-            shadows = shadows_of_roots(own, cuts, within, further, nearest, len(over.shares) == 1)
+            shadows = shadows_of_roots(along_own, cuts, here, len(over.shares) == 1)
         for shadow in shadows:
             if isinstance(shadow, Critical):
                 pool.critical[shadow] = None
             else:
-                pool.put(shadow[0], None, *shadow[1:])
-        pool.critical.update(dict.fromkeys(further_systems(systems, cuts, variable, *bounds)))
+                pool.put(shadow.surface, None, shadow.turning, shadow.steps, strata=shadow.strata)
+        pool.critical.update(dict.fromkeys(further_systems(systems, cuts, here)))
         pool.edges.update(dict.fromkeys(_edges(decisive, variable, hints, further)))
     else:
         cuts = (*cuts, *(Cut(ZERO, ZERO, (), False, (), corners=corners) for corners in pool.corners))
     if region is not None:
         pool.corners.append(region)
+    elif polynomial is not None and len(outer) > 1:  # of one variable further out the region tells
+        covers = covering(decisive, polynomial)
+    if covers:
         cuts = tuple(replace(cut, covers=covers[cut]) if cut in covers else cut for cut in cuts)
-    peaks = (*hints, *points_of(here, variable)[:MOST_CENTERS])
-    placed = (*cuts, *around_centers(here, variable)) if own is None else (own,)
+    peaks = (*hints, *points_of(centers, variable)[:MOST_CENTERS])
+    placed = (*cuts, *around_centers(centers, variable)) if along_own is None else (along_own,)
     return Level(variable, *bounds, peaks, placed, systems, complete, edges)
 
 

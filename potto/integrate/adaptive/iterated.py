@@ -258,7 +258,9 @@ class Iteration(Struct):
         summed = self.plan.over is not None and level is self.plan.levels[-1]
         rows = searched_rows(level, env, lo, hi, batch, machine, summed)
         if critical:
-            rows += critical_rows(critical, level.variable, env, lo, hi, near, batch, machine)
+            face = None if self.face is None else self.face.surface
+            arrangement = self.plan.outline.arrangement
+            rows += critical_rows(critical, level.variable, env, lo, hi, near, batch, machine, arrangement, face)
         return rows, None if lost is None else self.further_in * lost
 
     def ranges(

@@ -36,8 +36,9 @@ class Search(Struct):
     """A search for all solutions, over boxes (n, 2, P): the variable that is cut, then those further in.
 
     count: of systems, which have as many members each, in order. lost: those whose solutions are not all known. open:
-    the members of these, and the boxes in which there may be others.
-    reach: how far from 0 what is searched goes, (n, members); 1 where it goes farther.
+    the members of these, and the boxes in which there may be others. single: boxes with one solution each.
+    reach: how far from 0 what is searched goes, (n, members); 1 where it goes farther. sifted: which boxes, of which
+    members, may hold solutions that are asked for.
     """
 
     names: tuple[str, ...]
@@ -51,10 +52,12 @@ class Search(Struct):
     found: list[tuple[Ints, Array, Array]] = []
     lost: set[int] = set()
     open: list[tuple[Ints, Array]] = []
+    sifted: Callable[[Ints, Array], Bools] | None = None
+    single: list[tuple[Ints, Array]] = []
 
     def solved(self, low: Array, high: Array, within: Callable[[int], bool]) -> tuple[Ints, Array, Array]:
-        """Whose the solutions are, where they are, and how far off along the variable that is cut; not all of systems
-        with too many boxes. within: whether so many more of them are within the budget."""
+        """Whose the solutions are, where they are, and how far off, (n, P) both; not all of systems with too many
+        boxes. within: whether so many more of them are within the budget."""
         owner, box = self.whole(low, high)
         self.reach[:, owner] = np.minimum(1.0, np.abs(box).max(axis=1))
         each = low.size // self.count
@@ -79,14 +82,18 @@ class Search(Struct):
             owner, box = self.told(owner[~narrow], box[:, :, ~narrow], blurred[~narrow])
             owner, box = self.halved(owner, box)
         self.leave(owner, box)
+        if self.single:
+            self.polished(*(np.concatenate(parts, axis=-1) for parts in zip(*self.single, strict=True)))
         if not self.found:
             return _none(len(self.names))
         return tuple(np.concatenate(parts, axis=-1) for parts in zip(*self.found, strict=True))  # type: ignore[return-value]
 
     def leave(self, owner: Ints, box: Array) -> None:
         """Both ends of boxes that may hold solutions, as such."""
+        wide = box[:, 1] - box[:, 0]
+        wide[0] = 0.0
         for end in (box[:, 0], box[:, 1]):
-            self.found.append((owner, end, np.zeros(owner.size)))
+            self.found.append((owner, end, wide))
 
     def told(self, owner: Ints, box: Array, blurred: Bools) -> tuple[Ints, Array]:
         """The boxes in which rounding tells places from one another; the others are left, as places that are so far
@@ -103,7 +110,7 @@ class Search(Struct):
         if not gone.any():
             return owner, box
         there = box[:, :, gone]
-        self.found.append((owner[gone], 0.5 * (there[:, 0] + there[:, 1]), 0.5 * (there[0, 1] - there[0, 0])))
+        self.found.append((owner[gone], 0.5 * (there[:, 0] + there[:, 1]), 0.5 * (there[:, 1] - there[:, 0])))
         return owner[~gone], box[:, :, ~gone]
 
     def whole(self, low: Array, high: Array) -> tuple[Ints, Array]:
@@ -137,6 +144,9 @@ class Search(Struct):
         f = self.enclosed(self.equations, owner, box)
         may = ((f[:, 0] <= 0) & (f[:, 1] >= 0)).all(axis=0)
         owner, box = owner[may], box[:, :, may]
+        if self.sifted is not None and owner.size:
+            asked = self.sifted(owner, box)
+            owner, box = owner[asked], box[:, :, asked]
         side = box[:, 1] - box[:, 0]
         if not owner.size:
             return owner, box, side[0], np.zeros(0, dtype=bool)
@@ -149,7 +159,7 @@ class Search(Struct):
             lo = np.where(known, np.maximum(box[:, 0], step[:, 0]), box[:, 0])
             hi = np.where(known, np.minimum(box[:, 1], step[:, 1]), box[:, 1])
         gone = known & (lo > hi).any(axis=0)
-        self.polished(owner[one & ~gone], step[:, :, one & ~gone])
+        self.single.append((owner[one & ~gone], step[:, :, one & ~gone]))
         rest = ~(one | gone)
         blurred = known & (2 * rounded[0] >= side[0])
         return owner[rest], np.stack((lo, hi), axis=1)[:, :, rest], side[0, rest], blurred[rest]
@@ -177,17 +187,20 @@ class Search(Struct):
         """Note boxes with one solution each, as small as they get."""
         if not owner.size:
             return
+        waiting = np.arange(owner.size)
         with np.errstate(all="ignore"):
             for _ in range(POLISH):
-                step, _ = self.step(owner, box)
-                lo, hi = np.maximum(box[:, 0], step[:, 0]), np.minimum(box[:, 1], step[:, 1])
+                here = box[:, :, waiting]
+                step, _ = self.step(owner[waiting], here)
+                lo, hi = np.maximum(here[:, 0], step[:, 0]), np.minimum(here[:, 1], step[:, 1])
                 fine = np.isfinite(step).all(axis=(0, 1)) & (lo <= hi).all(axis=0)
-                better = np.where(fine, np.stack((lo, hi), axis=1), box)
-                done = (better[:, 1] - better[:, 0] >= STUCK * (box[:, 1] - box[:, 0])).all()
-                box = better
-                if done:
+                better = np.where(fine, np.stack((lo, hi), axis=1), here)
+                box[:, :, waiting] = better
+                shrinks = (better[:, 1] - better[:, 0] < STUCK * (here[:, 1] - here[:, 0])).any(axis=0)
+                waiting = waiting[shrinks]
+                if not waiting.size:
                     break
-        self.found.append((owner, 0.5 * (box[:, 0] + box[:, 1]), 0.5 * (box[0, 1] - box[0, 0])))
+        self.found.append((owner, 0.5 * (box[:, 0] + box[:, 1]), 0.5 * (box[:, 1] - box[:, 0])))
 
     def place(self, owner: Ints, box: Array) -> Array:
         """How far from 0 boxes are, (n, P), or what is searched where they lie about it: rounding is a part of it."""
@@ -216,7 +229,7 @@ class Search(Struct):
 
 
 def _none(n: int) -> tuple[Ints, Array, Array]:
-    return np.zeros(0, dtype=np.int64), np.zeros((n, 0)), np.zeros(0)
+    return np.zeros(0, dtype=np.int64), np.zeros((n, 0)), np.zeros((n, 0))
 
 
 def inverses(matrices: Array) -> Array:

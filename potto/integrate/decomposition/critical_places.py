@@ -12,11 +12,13 @@ from typing import Any
 
 import numpy as np
 from msgspec import Struct
+from msgspec.structs import replace
 
 from potto.calculus.decomposition.critical import Critical, Within, slopes_of
 from potto.calculus.inlining.alike import Leaf, SameShape, alike
 from potto.core.terms import Const, Term, Tuple, function_of, tuple_, var
 from potto.integrate.columns import side_by_side
+from potto.integrate.decomposition.arrangements import Arrangement, sieve
 from potto.integrate.decomposition.box_search import Search, inverses
 from potto.integrate.decomposition.effective_range import Ranges
 from potto.integrate.decomposition.meetings import SEARCHED, Row, as_array, tangents
@@ -35,11 +37,12 @@ BEYOND = 0.125  # how far beyond its range a turning place is looked for, which 
 
 def critical_rows(
     systems: Sequence[Critical], variable: str, env: dict[str, Value], lo: Cell, hi: Cell, near: Ranges, batch: int,
-    machine: Any,
+    machine: Any, arrangement: Arrangement | None = None, face: Term | None = None,
 ) -> list[Row]:  # fmt: skip
     """The cuts of one variable at places where what lies further in meets, appears, merges or turns.
 
-    near: of variables whose range is infinite, what matters of it.
+    near: of variables whose range is infinite, what matters of it. arrangement: the surfaces of what is integrated, if
+    it can be told at which places it is smooth all the same; face: the one, if any, that is integrated over.
     """
     low, high = as_array(np.minimum(lo.v, hi.v), batch), as_array(np.maximum(lo.v, hi.v), batch)
     around = BEYOND * np.where(np.isfinite(high - low), high - low, 0.0)
@@ -50,24 +53,30 @@ def critical_rows(
     numbers = frozenset(name for name, value in env.items() if isinstance(value, Cell))
     groups, unsearched = _groups(systems, variable, numbers)
     lost = [unsearched]
+    fixed = {name: as_array(env[name].v, batch) for name in numbers}  # type: ignore[union-attr]
     for group in groups:
         wide = [around if system.turning else 0.0 * around for system in group.systems]
         ends = low - np.stack(wide), high + np.stack(wide)
         count = len(group.systems)
         ones = np.ones((len(group.names), batch * count))
         search = Search(group.names, group.fixed(env, batch), *group.parts(), near, count, ones)
+        sifted = None if arrangement is None else sieve(arrangement, group.systems, group.names, fixed, machine, face)
+        if sifted is not None and not group.turning:
+            search.sifted = lambda owner, box, own=sifted: own.kept(owner // batch, owner % batch, box)
         owner, places, width = search.solved(ends[0].ravel(), ends[1].ravel(), machine.search)
         lost.append(len(search.lost))
+        counts = np.ones(owner.size, dtype=bool)
+        if sifted is not None and owner.size:
+            box = np.stack((places - width, places + width), axis=1)
+            counts = sifted.kept(owner // batch, owner % batch, box)
         for number, system in enumerate(group.systems):
             if number in search.lost:
                 continue
-            own = np.nonzero(owner // batch == number)[0]
-            whose, there, off = owner[own] % batch, places[:, own], width[own]
-            t, et = np.zeros((2, machine.directions if system.steps else 0, own.size))
-            if t.size:
-                doubt = 8 * EPS + off / np.maximum(reach[whose], np.abs(there[0]))
-                t, et = _speeds(system, variable, env, whose, there, doubt, machine)
-            rows += _as_rows(system, whose, there[0], off, same, batch, (t, et))
+            of = owner // batch == number
+            for own, passed in ((of & counts, False), (of & ~counts, True)):
+                if own.any() and (system.turning or not passed):
+                    found = owner[own] % batch, places[:, own], width[0, own]
+                    rows += _moving(system, variable, env, found, same, batch, reach, machine, passed)
     for _ in range(sum(lost)):
         machine.note(Unsearched(variable))
     return rows
@@ -91,6 +100,7 @@ def common_places(
     )
     owner, places, width = search.solved(low, high, machine.search)
     still = np.zeros((2, 0, owner.size))
+    width = width[0]
     rows = _as_rows(system, owner, places[0], width, SAME * (high - low), low.size, (still[0], still[1]), CROWD)
     x, e = (np.stack([middle * np.nan, *(getattr(row, name) for row in rows)]) for name in ("x", "e"))
     least, furthest = np.full(low.shape, np.inf), np.full(low.shape, -np.inf)
@@ -120,6 +130,11 @@ class _Alike(Struct, frozen=True):
     names: tuple[str, ...]
     terms: tuple[Term, ...]
     columns: tuple[tuple[str, tuple[Leaf, ...] | str], ...]
+
+    @property
+    def turning(self) -> bool:
+        """Whether any of them is where something turns."""
+        return any(system.turning for system in self.systems)
 
     def parts(self) -> tuple[Sequence[Term], Sequence[Term], Sequence[Term]]:
         """Equations, slopes and ends."""
@@ -215,6 +230,21 @@ def _speeds(
     moves = -inverse @ rates
     sizes = np.abs(inverse) @ (np.abs(rates) + np.abs(matrices) @ np.abs(moves))
     return moves[:, 0].T, sizes[:, 0].T * doubt
+
+
+def _moving(
+    system: Critical, variable: str, env: dict[str, Value], places: tuple[Ints, Array, Array], same: Array, batch: int,
+    reach: Array, machine: Any, passed: bool,
+) -> list[Row]:  # fmt: skip
+    """Places of members as rows, with their speeds where what is integrated steps. passed: turning places at which
+    nothing turns, but may a little further on: where a vertex ends an edge, what goes on beyond it."""
+    owner, there, off = places
+    t, et = np.zeros((2, machine.directions if system.steps and not passed else 0, owner.size))
+    if t.size:
+        doubt = 8 * EPS + off / np.maximum(reach[owner], np.abs(there[0]))
+        t, et = _speeds(system, variable, env, owner, there, doubt, machine)
+    rows = _as_rows(system, owner, there[0], off, same, batch, (t, et))
+    return [replace(row, passed=True) for row in rows] if passed else rows
 
 
 def _as_rows(

@@ -139,6 +139,8 @@ def segments(
     """
     nested = kin is not None
     (low, tl, el), (high, th, eh), sign = _ends(lo, hi, batch, directions)
+    beyond = [as_array(row.x, batch) for row in rows if row.passed]
+    rows = [row for row in rows if not row.passed]
     count = len(rows)
     roots, off, t = _stacked(rows, batch, directions)
     inside = np.zeros((count + 2, batch), dtype=bool)
@@ -154,7 +156,7 @@ def segments(
     t[:directions, 1:-1] = np.where(inner, t[:directions, 1:-1], th[:, None])
     t[directions:, 1:-1] = np.where(inner, t[directions:, 1:-1], 0.0)
     turning = (row.turning or (row.cut >= 0 and plan.level.cuts[row.cut].turning) for row in rows)
-    beyond = [(root, True) for root, turns in zip(roots, turning, strict=True) if turns]
+    beyond += [root for root, turns in zip(roots, turning, strict=True) if turns]
     rank = np.zeros((count + 2, batch), dtype=np.int64)
     conflict = paired = merged = False
     blur = np.zeros_like(x)
@@ -312,7 +314,7 @@ def _agree(t: Array, same: Bools, rank: Ints) -> None:
 
 
 def _pieces(
-    x: Array, e: Array, t: Array, rank: Ints, blur: Array, sign: Array, beyond: list[tuple[Array, bool]],
+    x: Array, e: Array, t: Array, rank: Ints, blur: Array, sign: Array, beyond: list[Array],
     edges: list[SurfaceOnBound],
 ) -> Cuts:  # fmt: skip
     a, b = x[:-1], x[1:]
@@ -321,7 +323,7 @@ def _pieces(
     k = t.shape[0] // 2
     (ta, da), (tb, db) = (np.split(t[:, at, owner], [k]) for at in (place, place + 1))
     left, right = np.full(a.shape, -np.inf), np.full(a.shape, np.inf)
-    for root, _ in beyond:
+    for root in beyond:
         at = root[owner]
         # a map around a point that is but a rounding beyond an end leaves out the square root of that
         near = ITSELF * EPS * np.abs(at)

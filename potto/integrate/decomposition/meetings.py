@@ -27,6 +27,7 @@ class Row(Struct):
 
     e, et: how far off the place, and its speeds, may be by rounding; None where that is not known.
     hides: how long the stretch around it is on all of which the surface is 0 to rounding, if there is one.
+    passed: nothing is cut there, though what lies beside it may go on like a square root that turns there.
     """
 
     x: Array
@@ -36,6 +37,7 @@ class Row(Struct):
     e: Any = None
     et: tuple[Any, ...] = ()
     hides: Any = None
+    passed: bool = False
 
 
 class SurfaceOnBound(Columns):

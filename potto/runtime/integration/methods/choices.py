@@ -11,8 +11,9 @@ from collections.abc import Iterable, Iterator
 
 from potto.calculus.decomposition.elimination import eliminable
 from potto.calculus.differentiation.level_sets import placed_along
-from potto.core.terms import INF, Integral, Term, postorder, reordered
+from potto.core.terms import INF, Integral, Prim, Term, postorder, reordered
 from potto.integrate.fixed.at_sight import worth_a_look
+from potto.integrate.plan import Plan
 from potto.runtime.integration.methods.quadrature import stretches
 from potto.runtime.integration.problem import Problem
 
@@ -157,6 +158,14 @@ def _searched(problem: Problem, order: Integral) -> tuple[int, int]:
     return plan.searches, sum(len(own.level.critical) for own in plan.levels)
 
 
+def _poles(plan: Plan) -> int:
+    """How many sections have poles somewhere: of `z > x*y` those along x have, and z = 0 is a saddle."""
+    names = frozenset(level.variable for level in plan.levels)
+    roots = (root for level in plan.levels for cut in level.level.cuts if cut.decides for root in cut.roots or ())
+    divisors = ([n.args[1] for n in postorder(root) if isinstance(n, Prim) and n.op == "div"] for root in roots)
+    return sum(any(not names.isdisjoint(divisor.free) for divisor in own) for own in divisors)
+
+
 def _fewest_cuts(problem: Problem) -> list[Integral]:
     """One order for each variable that may be innermost, those first that search for nothing, and of these those that
     cut the outermost variable at the fewest places.
@@ -170,7 +179,8 @@ def _fewest_cuts(problem: Problem) -> list[Integral]:
         searched = _searched(problem, order)
         if any(searched):
             return searched
-        return *searched, stretches(problem.plan(order), problem.machine, problem.env, problem.batch)
+        plan = problem.plan(order)
+        return *searched, stretches(plan, problem.machine, problem.env, problem.batch), _poles(plan)
 
     places = range(len(problem.term.variables))
     innermost: dict[str, Integral] = {}
