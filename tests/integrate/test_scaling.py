@@ -17,7 +17,7 @@ from spheres import directions
 import potto
 from potto.core.terms import Lam
 from potto.integrate.decomposition import conic_corners
-from potto.kernels.cells import Array, Bools
+from potto.kernels.cells import Array, Bools, Ints
 
 STEP = 2.3
 Made = Callable[[int], tuple[str, dict[str, float]]]
@@ -170,6 +170,25 @@ def test_half_as_many_cost_no_more(gradient: bool) -> None:
         costs.append(counted(lambda call=call: call(0.7)))  # type: ignore[misc]
     for small, large in itertools.pairwise(costs):
         assert small[0] <= large[0] and small[1] <= large[1]
+
+
+def test_what_passes_a_box_by_crosses_nothing_in_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of the lines of a scene few meet a pixel: of pairs of these alone it is asked where they cross."""
+    asked = list[int]()
+    looking = conic_corners._straight_crossings
+
+    def noting(v: Array, e: Array, p: Ints, *rest: Ints) -> conic_corners.Places:
+        asked.append(p.size)
+        return looking(v, e, p, *rest)
+
+    monkeypatch.setattr(conic_corners, "_straight_crossings", noting)
+    for n in (8, 16, 32):
+        lines = "*".join(f"(1 - [y + 0.25*x > t + {k}]/2)" for k in range(n))
+        asked.clear()
+        found = potto.compile(f"def f(t) integral ([0, 1], [0, 1]) ({lines}*(1 - [y > x/4 + 0.25])) d(x, y)").f(0.25)
+        # 3/8 lie below y = (1 + x)/4, and of the 1/4 between that and y = (1 - x)/4 half is taken
+        assert abs(found.value - 0.25) <= found.error < 1e-13
+        assert 0 < max(asked) < 40
 
 
 def test_crossings_within_a_union_are_left_out(monkeypatch: pytest.MonkeyPatch) -> None:

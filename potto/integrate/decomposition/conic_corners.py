@@ -52,7 +52,7 @@ def conic_corners(lines: Sequence[Array], conics: Sequence[Array], span: tuple[A
     """
     with np.errstate(all="ignore"):
         v, e = (_joined(of, more) for of, more in zip(lines, conics, strict=True))
-        p, q, owner = _pairs(v, e)
+        p, q, owner = _pairs(v, e, span)
         bent = p < conics[0].shape[1]
         places = _conic_crossings(v, e, p[bent], q[bent], owner[bent], span)
         return _left(places, v, e, (-1,) * v.shape[1])
@@ -66,7 +66,7 @@ def mixed_corners(
     `ConicRegion`. Of n in a union n^2/2 cross, and few of these are within none of the others."""
     with np.errstate(all="ignore"):
         v, e = (_joined(of, more) for of, more in zip(lines, conics, strict=True))
-        p, q, owner = _pairs(v, e)
+        p, q, owner = _pairs(v, e, span)
         bent = p < conics[0].shape[1]
         places = joined([_conic_crossings(v, e, p[bent], q[bent], owner[bent], span),
                          _straight_crossings(v[3:], e[3:], p[~bent], q[~bent], owner[~bent])])  # fmt: skip
@@ -87,17 +87,35 @@ def _left(places: Places, v: Array, e: Array, covers: Sequence[int]) -> Places:
     return places
 
 
-def _pairs(v: Array, e: Array) -> tuple[Ints, Ints, Ints]:
-    """Each two surfaces of each member, and whose they are; without those that cross nothing: they are 0 everywhere for
-    certain, or defined nowhere, as what a primitive of a scene hides of itself may be."""
+def _pairs(v: Array, e: Array, span: tuple[Array, Array]) -> tuple[Ints, Ints, Ints]:
+    """Each two surfaces of each member that may cross in its box, and whose they are. What passes the box by is left
+    out, most of a scene in a pixel; and what is 0 everywhere for certain, or defined nowhere, as what a primitive of a
+    scene hides of itself may be. The last two are the bounds of what is further in."""
     _, count, batch = v.shape
     p, q = (np.repeat(of, batch) for of in np.triu_indices(count, 1))
     owner = np.tile(np.arange(batch), p.size // batch)
-    bare = ((v == 0) & (e == 0)).all(axis=0) | (v != v).any(axis=0)
-    if bare.any():
-        there = ~(bare[p, owner] | bare[q, owner])
-        p, q, owner = p[there], q[there], owner[there]
-    return p, q, owner
+    passes = ((v == 0) & (e == 0)).all(axis=0) | (v != v).any(axis=0) | ~_met(v, e, _box(v, span))
+    passes[-2:] = False
+    there = ~(passes[p, owner] | passes[q, owner])
+    return p[there], q[there], owner[there]
+
+
+def _box(v: Array, span: tuple[Array, Array]) -> Array:
+    """The least and the most of both variables, (4, B)."""
+    low, high = (v[5, -2] / -v[4, -2], v[5, -1] / -v[4, -1])
+    return np.stack((*span, np.minimum(low, high), np.maximum(low, high)))
+
+
+def _met(v: Array, e: Array, box: Array) -> Bools:
+    """Whether surfaces (n, B) may meet a box: from its middle on they change by their slopes there, and by squares."""
+    (x, y), (w, h) = 0.5 * (box[1::2] + box[::2]), 0.5 * (box[1::2] - box[::2]) * (1 + BESIDE)
+    w, h = w + BESIDE * np.abs(x), h + BESIDE * np.abs(y)
+    parts = _summands(v, x, y)
+    sizes = _summands(np.abs(v) * CLEAR + e, np.abs(x) + w, np.abs(y) + h)
+    steep = np.abs(2 * v[0] * x + v[1] * y + v[3]) * w + np.abs(v[1] * x + 2 * v[2] * y + v[4]) * h
+    bent = np.abs(v[0]) * w * w + np.abs(v[1]) * w * h + np.abs(v[2]) * h * h
+    met: Bools = ~(np.abs(parts.sum(axis=0)) > steep + bent + sizes.sum(axis=0))
+    return met
 
 
 def _bounds_both(v: Array, e: Array, places: Places, polynomial: Lam, machine: Evaluator) -> Bools:
@@ -143,9 +161,8 @@ def _joined(lines: Array, conics: Array) -> Array:
 
 
 def _conic_crossings(v: Array, e: Array, p: Ints, q: Ints, owner: Ints, span: tuple[Array, Array]) -> Places:
-    """Where conics p cross conics or lines q. The last two are the bounds of what is further in."""
-    low, high = (v[5, -2] / -v[4, -2], v[5, -1] / -v[4, -1])
-    box = np.stack([of[owner] for of in (*span, np.minimum(low, high), np.maximum(low, high))])
+    """Where conics p cross conics or lines q."""
+    box = _box(v, span)[:, owner]
     found = crossings(Ball(v[:, p, owner], e[:, p, owner]), Ball(v[:, q, owner], e[:, q, owner]), box)
     at = found.pair
     return Places(p[at], q[at], owner[at], found.place, found.off, found.sure)
