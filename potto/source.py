@@ -1,8 +1,8 @@
 """Text and places in it.
 
-Owns `Span` and `SourceText`. Every offset is a count of code points. Spans kept in memoized values are relative to
-the start of their chunk (a top-level definition), so that an edit above moves nothing below; whoever shows them
-adds the chunk's start. UTF-16 exists only in `SourceText.utf16_column`.
+Owns `Span`, `NOWHERE` and `SourceText`. Every offset is a count of code points. Spans kept in memoized values are
+relative to the start of their chunk (a top-level definition), so that an edit above moves nothing below; whoever shows
+them adds the chunk's start. UTF-16 exists only in `SourceText.utf16_column`.
 """
 
 from __future__ import annotations
@@ -38,6 +38,9 @@ class Span:
 
     def __len__(self) -> int:
         return self.end - self.start
+
+
+NOWHERE = Span(0, 0)
 
 
 @value

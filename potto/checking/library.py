@@ -20,10 +20,9 @@ from potto.projects.project import Project, Projects, levelled, problems_of
 from potto.projects.settings import DEFAULTS, Settings
 from potto.query import Database
 from potto.reports.render import Located, ProgramError
-from potto.source import SourceText, Span
+from potto.source import NOWHERE, SourceText
 from potto.syntax import nodes
 
-NOWHERE = Span(0, 0)
 NO_PROGRAMS = declare("P0230", "a folder without programs")
 NO_SUCH_DEFINITION = declare("P0232", "a name on the command line that the file does not define")
 _absolute = lru_cache(maxsize=1024)(os.path.isabs)  # every call asks for the settings of its file

@@ -64,10 +64,11 @@ def _found_symbols(question: Question, form: str, options: argparse.Namespace, c
     import difflib
 
     from potto.checking.facts import derivative_facts
-    from potto.checking.library import NO_SUCH_DEFINITION, NOWHERE, Library
+    from potto.checking.library import NO_SUCH_DEFINITION, Library
     from potto.cli.opening import fail, others_json, report_others
     from potto.modules import DefinitionTarget, names, resolve
     from potto.reports.render import Located, ProgramError
+    from potto.source import NOWHERE
     from potto.syntax import nodes
 
     world = Library(["."])

@@ -379,6 +379,9 @@ def hole(reason: str, measure: bool = False) -> Hole:
 
 ZERO = const(0.0)
 ONE = const(1.0)
+TWO = const(2.0)
+HALF = const(0.5)
+NAN = const(math.nan)
 PI = const(math.pi, "pi")
 INF = const(math.inf, "inf")
 

@@ -11,9 +11,12 @@ from potto.core.folding import mul as mul
 from potto.core.folding import neg as neg
 from potto.core.folding import pow_ as pow_
 from potto.core.folding import sub as sub
+from potto.core.kinds import HALF as HALF
 from potto.core.kinds import INF as INF
+from potto.core.kinds import NAN as NAN
 from potto.core.kinds import ONE as ONE
 from potto.core.kinds import PI as PI
+from potto.core.kinds import TWO as TWO
 from potto.core.kinds import ZERO as ZERO
 from potto.core.kinds import App as App
 from potto.core.kinds import Array as Array

@@ -11,13 +11,10 @@ from collections.abc import Callable, Mapping
 
 from msgspec import Struct
 
-from potto.core.terms import Prim, Term, add, const, div, mul, pow_, prim, sub
+from potto.core.terms import HALF, TWO, Prim, Term, add, div, mul, pow_, prim, sub
 
 Terms = tuple[Term, ...]
 Interval = tuple[float, float]
-
-_TWO = const(2.0)
-_HALF = const(0.5)
 
 
 class Recognition(Struct, frozen=True):
@@ -148,8 +145,8 @@ parabola = _register(
         "parabola",
         dims=2,
         doc="The plane with a parabola straightened.",
-        forward=lambda x, p: (sub(x[1], mul(p[0], pow_(x[0], _TWO))), x[0]),
-        inverse=lambda u, p: (u[1], add(u[0], mul(p[0], pow_(u[1], _TWO)))),
+        forward=lambda x, p: (sub(x[1], mul(p[0], pow_(x[0], TWO))), x[0]),
+        inverse=lambda u, p: (u[1], add(u[0], mul(p[0], pow_(u[1], TWO)))),
         params=((-3.0, 3.0),),
         domain=_BOX,
     )
@@ -171,14 +168,14 @@ hyperbolic = _register(
 
 def _polar_images(x: Terms, u: Terms) -> Mapping[Term, Term]:
     (p, q), (radius, _) = x, u
-    squares = [(pow_(p, _TWO), pow_(q, _TWO)), (prim("mul", p, p), prim("mul", q, q))]
+    squares = [(pow_(p, TWO), pow_(q, TWO)), (prim("mul", p, p), prim("mul", q, q))]
     images: dict[Term, Term] = {prim("atan2", q, p): u[1]}
     for a, b in ((p, q), (q, p)):
         images[prim("hypot", a, b)] = radius
     for a, b in squares:
         for total in (add(a, b), add(b, a)):
             images[prim("sqrt", total)] = radius
-            images[total] = pow_(radius, _TWO)
+            images[total] = pow_(radius, TWO)
     return images
 
 
@@ -240,7 +237,7 @@ rapidity = _register(
         forward=lambda x, p: (mul(x[0], prim("cosh", x[1])), mul(x[0], prim("sinh", x[1]))),
         inverse=lambda u, p: (
             prim("sqrt", mul(sub(u[0], u[1]), add(u[0], u[1]))),
-            mul(_HALF, prim("log", div(add(u[0], u[1]), sub(u[0], u[1])))),
+            mul(HALF, prim("log", div(add(u[0], u[1]), sub(u[0], u[1])))),
         ),
         domain=((0.1, 3.0), (-2.0, 2.0)),
         recognition=Recognition(anchor=lambda node: _turned(node, "cosh"), images=_multiples("cosh", "sinh")),

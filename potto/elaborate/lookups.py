@@ -11,6 +11,7 @@ from collections.abc import Callable
 from functools import partial
 
 from potto.core.terms import (
+    HALF,
     ONE,
     ZERO,
     Term,
@@ -30,7 +31,6 @@ from potto.elaborate.arrays import element, shaped, together
 from potto.elaborate.context import Elaboration
 from potto.types.types import ArrayOf, TupleOf, Type, resolve
 
-HALF = const(0.5)
 Read = Callable[[Term], Term]
 
 

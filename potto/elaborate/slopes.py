@@ -16,7 +16,7 @@ from potto.elaborate.conditions import choose, compare
 from potto.elaborate.context import Elaboration, lambdas
 from potto.elaborate.values import BuiltinValue, LocalFunction, Value
 from potto.modules.free import free_references
-from potto.source import Span
+from potto.source import NOWHERE
 from potto.syntax import nodes
 from potto.syntax.written import without_parentheses
 from potto.types import infer_expression
@@ -33,7 +33,6 @@ from potto.types.types import (
     result_of,
 )
 
-NOWHERE = Span(0, 0)
 Along = Callable[[Term], Term]
 """The derivative of the answer for a tangent of what is looked at."""
 

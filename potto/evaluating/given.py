@@ -13,14 +13,14 @@ from collections.abc import Collection, Iterable, Sequence
 
 from msgspec.structs import replace
 
-from potto.checking.library import NO_SUCH_DEFINITION, NOWHERE, Library
+from potto.checking.library import NO_SUCH_DEFINITION, Library
 from potto.checking.spoiled import definition_errors
 from potto.diagnostics import Diagnostic, Related
 from potto.kernels.errors import wrong_call
 from potto.modules import DefinitionTarget, chunk_start, definition, names, resolve
 from potto.modules.usage import names_in, used_names
 from potto.reports.render import Located, ProgramError, display_name
-from potto.source import SourceText, Span
+from potto.source import NOWHERE, SourceText, Span
 from potto.syntax import parse_expression
 from potto.types import groups_of, infer_expression, interface
 from potto.types.mismatches import rows_of

@@ -1,7 +1,7 @@
 """What an evaluation is spent on: evaluations of interior and boundary, cells, surfaces kept and dropped, and why.
 
-Owns `Costs` and `counting`, which asks for them: keeping these books takes time, so that nobody pays who does not read
-them. The integrator and the sampler write; the runtime makes them a part of an estimate's `stats`.
+Owns `Costs` and `counting`, which asks for them: counting takes time, so that nobody pays who does not read them. The
+integrator and the sampler write; the runtime makes them a part of an estimate's `stats`.
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ def wanted() -> bool:
     return _wanted.get()
 
 
-def books() -> Costs | None:
-    """Record to write in, if anyone asked for them."""
+def if_wanted() -> Costs | None:
+    """Costs to be counted, if anyone asked for them."""
     return Costs() if wanted() else None
 
 
@@ -61,7 +61,7 @@ class SurfaceCount(Struct):
 
 
 class Costs(Struct):
-    """The books of one evaluation.
+    """The costs of one evaluation.
 
     interior: evaluations of integrands at nodes. boundary: at places that move, where boundary terms are read off.
     checks: at ends that stand still, for peaks and jumps that lie there. cells: stretches of the innermost variable

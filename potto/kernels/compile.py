@@ -13,12 +13,7 @@ from functools import lru_cache
 from typing import Any
 
 from potto.core.packing import keep, recall
-from potto.core.terms import (
-    Global,
-    Lam,
-    Term,
-    postorder,
-)  # fmt: skip
+from potto.core.terms import Global, Lam, Term, postorder
 from potto.kernels.cells import Pattern
 from potto.kernels.kinks import bends
 from potto.kernels.making import compiling, counts, making

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 from potto.diagnostics import PottoError, declare
-from potto.source import Span
-
-NOWHERE = Span(0, 0)
+from potto.source import NOWHERE as NOWHERE
 
 _KINDS = {"tuple": "a tuple", "list": "an array", "Rows": "an array"}
 

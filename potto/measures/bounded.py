@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from potto.core.terms import INF, ONE, PI, ZERO, Term, add, branch, const, div, mul, neg, prim, sub
+from potto.core.terms import INF, ONE, PI, TWO, ZERO, Term, add, branch, const, div, mul, neg, prim, sub
 from potto.measures.registry import Condition, Measure, register
 from potto.measures.unbounded import normal, scale_conditions, spread
-
-TWO = const(2.0)
 
 
 def _between(a: Term, b: Term) -> tuple[Condition, ...]:

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from potto.core.terms import INF, ONE, PI, ZERO, Term, add, branch, const, div, mul, neg, prim, sub
+from potto.core.terms import HALF, INF, ONE, PI, TWO, ZERO, Term, add, branch, const, div, mul, neg, prim, sub
 from potto.measures.registry import Condition, Measure, Terms, register
 
-TWO = const(2.0)
-HALF = const(0.5)
 ROOT_TWO = prim("sqrt", TWO)
 
 

@@ -11,12 +11,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from potto.core.terms import ONE, ZERO, Term, add, const, div, if_, mul, neg, prim, sub
+from potto.core.terms import ONE, TWO, ZERO, Term, add, div, if_, mul, neg, prim, sub
 from potto.primitives.bounds import exponential
 from potto.primitives.registry import EPS, Elementwise, Ends, Primitive, Quantity, register
 
 TOPIC = "Bessel functions"
-TWO = const(2.0)
 MOST = 1e-15  # of the values below on the real line: rounding of what is worked out from them
 # In halves of a last place of the largest value nearby, and at 0 of the power of x that it falls with: 16 and 5 are the
 # most among 2,000 points up to 1e9 of each of the orders 0 to 4, for `jv` and `spherical_jn`; 4 up to 25 by `j0`, `j1`.

@@ -4,12 +4,9 @@ from __future__ import annotations
 
 import math
 
-from potto.core.terms import ONE, Term, add, branch, const, div, mul, prim, sub
+from potto.core.terms import HALF, NAN, ONE, Term, add, branch, div, mul, prim, sub
 from potto.primitives.bounds import exponential, share, slack
 from potto.primitives.registry import Elementwise, Primitive, Quantity, Terms, always, register
-
-NAN = const(math.nan)
-HALF = const(0.5)
 
 
 def _root_remainder(ops: Elementwise, m: Quantity, d: Quantity) -> Quantity:

@@ -8,14 +8,13 @@ from __future__ import annotations
 
 import math
 
-from potto.core.terms import ONE, ZERO, add, const, mul, neg, prim
+from potto.core.terms import ONE, TWO, ZERO, add, const, mul, neg, prim
 from potto.primitives.bounds import clear
 from potto.primitives.registry import Elementwise, Ends, Primitive, Quantity, Truth, register
 
 TOPIC = "The gamma function"
 POSITIVE = (0.0, math.inf)
 LOWEST = 1.4616321449683623  # where gamma is least (NIST, Digital Library of Mathematical Functions, 5.4.19), rounded
-TWO = const(2.0)
 
 
 def _curvature(ops: Elementwise, x: Quantity) -> Quantity:

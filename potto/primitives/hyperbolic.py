@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import math
 
-from potto.core.terms import ONE, Term, add, branch, const, div, mul, neg, prim, sub
+from potto.core.terms import HALF, ONE, Term, add, branch, const, div, mul, neg, prim, sub
 from potto.primitives.bounds import clear, rising, waves
 from potto.primitives.registry import Elementwise, Primitive, Quantity, Terms, always, register
-
-HALF = const(0.5)
 
 
 def _asinh_remainder(ops: Elementwise, m: Quantity, d: Quantity) -> Quantity:

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import math
 
-from potto.core.terms import ONE, PI, Term, add, branch, const, div, mul, neg, prim, sub
+from potto.core.terms import NAN, ONE, PI, Term, add, branch, const, div, mul, neg, prim, sub
 from potto.primitives.bounds import angle, clear, length, rising, tangent, wave, waves
 from potto.primitives.registry import Elementwise, Primitive, Quantity, Terms, always, register
 
-NAN = const(math.nan)
 HALF_PI = div(PI, const(2.0))
 TWO_PI = mul(const(2.0), PI)
 

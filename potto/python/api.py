@@ -27,13 +27,12 @@ from potto.python.functions import Function
 from potto.python.travel import Travelling
 from potto.reports.render import ProgramError, display_name
 from potto.runtime.answers.estimate import Estimate
-from potto.source import Span
+from potto.source import NOWHERE
 from potto.syntax import nodes
 from potto.types import infer_expression
 from potto.types.types import Diffeo
 from potto.types.types import Function as FunctionType
 
-NOWHERE = Span(0, 0)
 _texts = itertools.count(1)
 # Modules of texts that import nothing, by folder, name and text: what a cell of a notebook that is run again need not
 # be checked for again.

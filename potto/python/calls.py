@@ -24,13 +24,12 @@ from potto.runtime.answers.records import named_answer
 from potto.runtime.answers.shown import as_dual, gives_dual
 from potto.runtime.evaluate import Clock, report
 from potto.runtime.evaluation.machine import Machine
-from potto.source import Span
+from potto.source import NOWHERE
 from potto.syntax import nodes
 from potto.types import infer_expression
 from potto.types.types import Function as FunctionType
 from potto.types.types import Type
 
-NOWHERE = Span(0, 0)
 BATCHES = "batches"
 Form = tuple[tuple[int, tuple[str, ...]], ...]
 

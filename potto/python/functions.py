@@ -40,7 +40,7 @@ from potto.python.tiles import in_tiles
 from potto.python.travel import Travelling
 from potto.runtime.answers.estimate import Estimate
 from potto.runtime.evaluation.functions import Closure
-from potto.source import Span
+from potto.source import NOWHERE
 from potto.syntax import nodes, print_expression
 from potto.types import derivative_type, format_type, infer_expression
 from potto.types.kinds import NO_TANGENT
@@ -49,7 +49,6 @@ from potto.types.queries import is_derivative
 from potto.types.types import Function as FunctionType
 from potto.types.types import Parameter, TupleOf, Type, groups_of, result_of
 
-NOWHERE = Span(0, 0)
 NOTHING: Mapping[str, Any] = MappingProxyType({})
 
 

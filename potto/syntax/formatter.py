@@ -12,13 +12,11 @@ from potto.syntax.chunks import split
 from potto.syntax.lexer import MAX_LENGTH, lex
 from potto.syntax.parser import parse_chunk
 from potto.syntax.spacing import Spaced, spaced
-from potto.syntax.tokens import Comment, normalized
+from potto.syntax.tokens import CLOSERS, OPENERS, Comment, normalized
 from potto.syntax.walk import without_spans
 
 WIDTH = 100
 _INDENT = 4
-_CLOSERS = frozenset({"RPAR", "RSQB"})
-_OPENERS = frozenset({"LPAR", "LSQB", "ADJACENT"})
 _CLAUSES = frozenset({"INVERSE", "WHERE"})
 
 
@@ -111,9 +109,9 @@ class _Layout:
     def _follow_brackets(self, line: _Line, opened: list[int]) -> None:
         for index in range(line.first, line.last):
             kind = self.tokens[index].token.kind
-            if kind in _OPENERS:
+            if kind in OPENERS:
                 opened.append(line.indent)
-            elif kind in _CLOSERS:
+            elif kind in CLOSERS:
                 opened.pop()
 
     def _indent(self, line: _Line, opened: list[int]) -> int:
@@ -128,7 +126,7 @@ class _Layout:
         if not opened:  # the bodies of `let`s stand below each other
             return max(1, first.level + self.inset + (not first.body)) * _INDENT
         closers = 0
-        while line.first + closers < line.last and self.tokens[line.first + closers].token.kind in _CLOSERS:
+        while line.first + closers < line.last and self.tokens[line.first + closers].token.kind in CLOSERS:
             closers += 1
         return opened[-closers] if closers else opened[-1] + _INDENT
 

@@ -8,12 +8,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from potto.syntax.contextual import ENDS_OPERAND
 from potto.syntax.head import BlockTracker
-from potto.syntax.tokens import KEYWORDS, Token
+from potto.syntax.tokens import CLOSERS, KEYWORDS, OPENERS, Token
 
-_ENDS_OPERAND = frozenset({"NAME", "NUMBER", "MEMBER", "FIELD", "RPAR", "RSQB"})
-_OPENERS = frozenset({"LPAR", "LSQB", "ADJACENT"})
-_CLOSERS = frozenset({"RPAR", "RSQB"})
 _CONDITIONS = frozenset({"<", "<=", ">", ">=", "==", "!=", "≤", "≥", "≠", "and", "or", "&&", "||"})
 _OPEN_ENDED = frozenset({"IF", "QMARK", "LAMBDA", "LET", "COMMA", "FOR", "WITH"})
 """What makes something else of what is in brackets than a condition."""
@@ -102,21 +100,21 @@ class _Pass:
         if self.starts:
             self.loop = token.kind == "FOR" and len(self.brackets) == 1
         kind = token.kind
-        if kind in _CLOSERS:
+        if kind in CLOSERS:
             closed = self.brackets.pop()
             self.depth -= 1 + closed.inner
         blank = before is not None and not self.starts and self._blank(before, token)
-        opens = len(self.brackets) == 1 and kind not in _CLOSERS and self._opens(token)
+        opens = len(self.brackets) == 1 and kind not in CLOSERS and self._opens(token)
         may_break = before is not None and self._may_break(before, token) and not (self.loop and not self.depth)
         depth = -1 if opens else self.depth - self.bounds_closed
         self.out.append(Spaced(token, blank, depth, opens or may_break, self.level, self.starts, self.body, opens))
         self.body = self.starts = self.marked = self.bounds_closed = False
-        if kind in _OPENERS:
+        if kind in OPENERS:
             self.brackets[-1].bound &= before is not None and before.kind == "FOLD"
             last = "" if before is None else before.kind
             self.brackets.append(_Bracket(kind, last == "INTEGRAL", last == "D"))
             self.depth += 1
-        elif kind in _CLOSERS:
+        elif kind in CLOSERS:
             self.bounds_closed = closed.bounds
             self._deeper(-2 if closed.variables else 0)
         elif kind == "QMARK":
@@ -147,7 +145,7 @@ class _Pass:
     def _is_prefix(self) -> bool:
         """Whether the sign that was written last has no operand before it."""
         sign = self.out[-1]
-        return len(self.out) == 1 or sign.starts or sign.opens or self.out[-2].token.kind not in _ENDS_OPERAND
+        return len(self.out) == 1 or sign.starts or sign.opens or self.out[-2].token.kind not in ENDS_OPERAND
 
     def _is_star_of_type(self, before: Token) -> bool:
         return before.kind == "NAME" and before.text in _TYPES
@@ -161,13 +159,13 @@ class _Pass:
         if kind == "IN":
             return self.brackets[-1].lets > 0
         if kind in ("SIGN", "STAR", "BINOP"):
-            return before.kind in _ENDS_OPERAND and token.text != "^" and not self._is_star_of_type(before)
+            return before.kind in ENDS_OPERAND and token.text != "^" and not self._is_star_of_type(before)
         return before.kind == "DOT"
 
     def _blank(self, before: Token, token: Token) -> bool:
         """Whether a blank stands between two tokens of a line."""
         kind, last = token.kind, before.kind
-        if last in _OPENERS or kind in _CLOSERS or kind in ("COMMA", "SEMI"):
+        if last in OPENERS or kind in CLOSERS or kind in ("COMMA", "SEMI"):
             return False
         if last in ("COMMA", "SEMI", "ALSO"):
             return True
@@ -187,7 +185,7 @@ class _Pass:
             return False
         if kind == "STAR" and self._is_star_of_type(before):
             return False
-        if kind in _OPENERS:
+        if kind in OPENERS:
             return self._blank_before_bracket(before, token)
         return True
 
@@ -199,7 +197,7 @@ class _Pass:
     def _blank_before_bracket(self, before: Token, token: Token) -> bool:
         if before.kind in ("D", "DIFFEO"):
             return False
-        if before.text in KEYWORDS or before.kind not in _ENDS_OPERAND or self.marked or self.bounds_closed:
+        if before.text in KEYWORDS or before.kind not in ENDS_OPERAND or self.marked or self.bounds_closed:
             return True
         if token.kind == "LSQB":
             return before.text not in _TYPES
@@ -214,9 +212,9 @@ def _conditions(tokens: list[Token]) -> frozenset[int]:
     found: list[int] = []
     open_: list[tuple[Token, set[str]]] = []
     for token in tokens:
-        if token.kind in _OPENERS:
+        if token.kind in OPENERS:
             open_.append((token, set()))
-        elif token.kind in _CLOSERS and open_:
+        elif token.kind in CLOSERS and open_:
             opener, kinds = open_.pop()
             if opener.kind == "ADJACENT" and "condition" in kinds and not kinds & _OPEN_ENDED:
                 found.append(opener.start)

@@ -6,10 +6,9 @@ does: `1..n(i^2)`, `1..f(n)(i)`.
 
 from __future__ import annotations
 
-from potto.syntax.tokens import Token
+from potto.syntax.contextual import ENDS_OPERAND
+from potto.syntax.tokens import OPENERS, Token
 
-_ENDS_OPERAND = frozenset({"NAME", "NUMBER", "MEMBER", "FIELD", "RPAR", "RSQB"})
-_OPENERS = frozenset({"LPAR", "LSQB", "ADJACENT"})
 _STOPS = frozenset(
     {
         "COMMA",
@@ -58,7 +57,7 @@ def _last_range(tokens: list[Token], index: int) -> int | None:
     depth, start, waiting = 0, None, tokens[index].kind == "FOLD"  # for the `for` of a fold
     for place in range(index + 1, len(tokens)):
         kind = tokens[place].kind
-        if kind in _OPENERS:
+        if kind in OPENERS:
             depth += 1
         elif kind == "RPAR" or kind == "RSQB":
             depth -= 1
@@ -84,8 +83,8 @@ def _body(tokens: list[Token], index: int) -> int | None:
     previous = tokens[index - 1]
     while index < len(tokens):
         token = tokens[index]
-        if token.kind in _OPENERS:
-            if depth == 0 and token.kind == "LPAR" and previous.kind in _ENDS_OPERAND:
+        if token.kind in OPENERS:
+            if depth == 0 and token.kind == "LPAR" and previous.kind in ENDS_OPERAND:
                 if token.start > previous.end:
                     return index
                 if not run_ended and previous.text != "len":  # which is not a bound itself

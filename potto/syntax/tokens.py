@@ -34,6 +34,9 @@ class Comment:
     own_line: bool
 
 
+# Kinds of tokens that open and close brackets.
+OPENERS = frozenset({"LPAR", "LSQB", "ADJACENT"})
+CLOSERS = frozenset({"RPAR", "RSQB"})
 KEYWORDS: dict[str, str] = {
     "def": "DEF",
     "for": "FOR",

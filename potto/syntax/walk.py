@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any, TypeVar
 
-from potto.source import Span
+from potto.source import NOWHERE, Span
 from potto.syntax import nodes
 from potto.syntax.nodes import Node
 
@@ -16,7 +16,6 @@ _Any = TypeVar("_Any")
 _CLASSES: frozenset[type] = frozenset(
     found for found in vars(nodes).values() if isinstance(found, type) and hasattr(found, "__match_args__")
 ) - {Span}
-NOWHERE = Span(0, 0)
 
 
 def _inner_fields(kind: Any) -> tuple[str, ...]:

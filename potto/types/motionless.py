@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 from potto.diagnostics import Diagnostic, Suggestion, shortened
 from potto.quick import replace
-from potto.source import Span
+from potto.source import NOWHERE
 from potto.syntax import nodes
 from potto.syntax.printer import print_expression
 from potto.syntax.written import without_parentheses
@@ -23,7 +23,6 @@ from potto.types.types import REAL, Dist, Function, Parameter, Real, TupleOf, Ty
 
 LONGEST = 60  # characters of a call that a help writes out
 MOTIONLESS = "no argument of this derivative has a tangent, so its tangent is 0 everywhere"
-NOWHERE = Span(0, 0)
 _ONE, _ZERO = nodes.Number(NOWHERE, "1", 1.0), nodes.Number(NOWHERE, "0", 0.0)
 GENERAL = "give the number that moves as a pair, `(value, tangent)`"
 

@@ -16,13 +16,10 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from potto.quick import quick, value
-from potto.source import Span
+from potto.source import NOWHERE, Span
 
 SourceKind = Literal["variable", "input", "other"]  # other: the index of a sum, or what is wrong
 SinkKind = Literal["condition", "jump", "sum", "count", "index", "equality", "declared", "integral", "delta"]
-
-
-NOWHERE = Span(0, 0)
 
 
 @dataclass(eq=False, repr=False, slots=True)

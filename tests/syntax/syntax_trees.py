@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from hypothesis import strategies as st
 
+from potto.source import NOWHERE as O
 from potto.syntax.nodes import (
     Apply,
     Argument,
@@ -59,7 +60,6 @@ from potto.syntax.nodes import (
     Unary,
     With,
 )
-from potto.syntax.walk import NOWHERE as O
 
 names = st.sampled_from(["a", "b", "x", "y", "θ", "px_0", "shader", "e", "deriv", "dx"])
 numbers = st.sampled_from(["0", "2", "0.5", "1e-3", "12.25e2", "3."]).map(lambda t: Number(O, t, float(t)))

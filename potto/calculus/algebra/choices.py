@@ -5,9 +5,8 @@ Owns `with_unknown_sides`.
 
 from __future__ import annotations
 
-from potto.calculus.algebra.radicals import NAN
 from potto.core.simplify import normalized_surface
-from potto.core.terms import ONE, Branch, If, Prim, Term, Var, add, branch, mul, postorder, rebuild, sub, var
+from potto.core.terms import NAN, ONE, Branch, If, Prim, Term, Var, add, branch, mul, postorder, rebuild, sub, var
 from potto.primitives import PRIMITIVES
 
 

@@ -9,10 +9,7 @@ from __future__ import annotations
 import math
 
 from potto.calculus.algebra.ranges import range_of
-from potto.core.terms import ONE, ZERO, Const, Prim, Term, add, branch, const, div, mul, neg, pow_, prim, sub
-
-NAN = const(math.nan)
-TWO = const(2.0)
+from potto.core.terms import NAN, ONE, ZERO, Const, Prim, Term, add, branch, const, div, mul, neg, pow_, prim, sub
 
 
 def guarded(surface: Term, value: Term, strict: bool = False) -> Term:

@@ -24,6 +24,7 @@ from potto.core.terms import (
     INF,
     ONE,
     PI,
+    TWO,
     ZERO,
     App,
     Branch,
@@ -52,7 +53,6 @@ from potto.core.terms import (
 )
 
 KINDS = (Const, Var, Prim, Branch, Delta, If, App, Global)
-TWO = const(2.0)
 LOGARITHM = "@log"  # behind the name of a variable
 TOGETHER = "@together"  # behind the name of the first variable of a combination
 WIDE = (3.0, 8.0)  # where rules look at a normal density, in standard deviations: as the measure does

@@ -8,11 +8,26 @@ from __future__ import annotations
 from collections.abc import Iterator
 from math import inf
 
-from potto.calculus.algebra.radicals import NAN
 from potto.calculus.algebra.ranges import range_of
 from potto.calculus.algebra.rational_form import is_zero
 from potto.calculus.differentiation.derivative import zero_like
-from potto.core.terms import ONE, Branch, If, Prim, Term, Tuple, branch, const, if_, mul, neg, postorder, sub, tuple_
+from potto.core.terms import (
+    NAN,
+    ONE,
+    Branch,
+    If,
+    Prim,
+    Term,
+    Tuple,
+    branch,
+    const,
+    if_,
+    mul,
+    neg,
+    postorder,
+    sub,
+    tuple_,
+)
 from potto.primitives import PRIMITIVES
 
 

@@ -13,7 +13,6 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
 from msgspec import Struct
 
-from potto.calculus.algebra.radicals import NAN
 from potto.calculus.algebra.ranges import Box
 from potto.calculus.algebra.rational_form import is_zero
 from potto.calculus.differentiation.between import between, scaled
@@ -37,6 +36,7 @@ from potto.calculus.surfaces.branch_assignment import (
 )
 from potto.core.simplify import normalized_surface
 from potto.core.terms import (
+    NAN,
     ONE,
     ZERO,
     Branch,

@@ -15,7 +15,6 @@ from math import inf, nextafter
 from msgspec import Struct
 
 from potto.calculus.algebra.polynomial_in import collect
-from potto.calculus.algebra.radicals import NAN
 from potto.calculus.algebra.ranges import Box, range_of
 from potto.calculus.algebra.rational_form import is_zero, normal
 from potto.calculus.differentiation.derivative import partial
@@ -23,6 +22,7 @@ from potto.calculus.solving.pivots import SurfaceRoot
 from potto.calculus.surfaces.branch_assignment import Flip, unguarded
 from potto.core.simplify import normalized_surface
 from potto.core.terms import (
+    NAN,
     ZERO,
     Branch,
     Global,

@@ -13,9 +13,8 @@ from potto.calculus.algebra.rational_form import normal
 from potto.calculus.explanation.brackets import constant
 from potto.calculus.explanation.factors import Factors
 from potto.calculus.explanation.products import written
-from potto.core.terms import ONE, PI, ZERO, Prim, Term, Var, add, const, div, mul, neg, pow_, prim, sub
+from potto.core.terms import ONE, PI, TWO, ZERO, Prim, Term, Var, add, const, div, mul, neg, pow_, prim, sub
 
-_TWO = const(2.0)
 _HALF = Fraction(1, 2)
 _SIXTH, _QUARTER = Fraction(1, 6), Fraction(1, 4)
 _TABLE = {  # multiples of pi
@@ -96,7 +95,7 @@ def _turned_by_an_eighth(op: str, angle: Term) -> Term | None:
         return None
     sin, cos = _same("sin", inner), _same("cos", inner)
     turned = cos if op == "sin" else neg(sin)
-    return div(add(sin if op == "sin" else cos, turned if part.top[()] == 1 else neg(turned)), prim("sqrt", _TWO))
+    return div(add(sin if op == "sin" else cos, turned if part.top[()] == 1 else neg(turned)), prim("sqrt", TWO))
 
 
 def _same(op: str, angle: Term) -> Term:
@@ -112,11 +111,11 @@ def _same(op: str, angle: Term) -> Term:
 
 
 def _other(u: Term) -> Term:
-    return prim("sqrt", sub(ONE, pow_(u, _TWO)))
+    return prim("sqrt", sub(ONE, pow_(u, TWO)))
 
 
 def _longest(u: Term) -> Term:
-    return prim("sqrt", add(ONE, pow_(u, _TWO)))
+    return prim("sqrt", add(ONE, pow_(u, TWO)))
 
 
 def _itself(u: Term) -> Term:

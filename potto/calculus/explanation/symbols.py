@@ -11,7 +11,6 @@ from collections.abc import Iterable, Iterator, Mapping
 
 from msgspec import Struct
 
-from potto.calculus.algebra.radicals import NAN
 from potto.calculus.algebra.ranges import Box
 from potto.calculus.differentiation.derivative import vanishes
 from potto.calculus.differentiation.root_names import RootNames
@@ -24,6 +23,7 @@ from potto.calculus.surfaces.trace import spine
 from potto.core.printer import LEFT_OUT
 from potto.core.simplify import simplify
 from potto.core.terms import (
+    NAN,
     ONE,
     ZERO,
     App,

@@ -13,11 +13,12 @@ from collections.abc import Mapping, Sequence
 from msgspec import Struct
 
 from potto.calculus.algebra.affine import affine, determinant, solve_affine
-from potto.calculus.algebra.radicals import NAN, guarded
+from potto.calculus.algebra.radicals import guarded
 from potto.calculus.algebra.rational_form import is_zero, shorter, tidy
 from potto.calculus.differentiation.derivative import partial
 from potto.calculus.solving.solve import Sections, Unsolvable, sections
 from potto.core.terms import (
+    NAN,
     ZERO,
     Prim,
     Term,

@@ -13,11 +13,12 @@ from collections.abc import Callable
 
 from msgspec import Struct
 
-from potto.calculus.algebra.radicals import TWO, even_root, guarded, minus, odd_root, quotient
+from potto.calculus.algebra.radicals import even_root, guarded, minus, odd_root, quotient
 from potto.calculus.algebra.ranges import range_of
 from potto.core.terms import (
     ONE,
     PI,
+    TWO,
     ZERO,
     Branch,
     Const,

@@ -14,13 +14,14 @@ from fractions import Fraction
 
 from potto.calculus.algebra.fractions import numerator
 from potto.calculus.algebra.polynomial_in import Collected, collect, dominators
-from potto.calculus.algebra.radicals import TWO, minus, quotient, signed, square_root
+from potto.calculus.algebra.radicals import minus, quotient, signed, square_root
 from potto.calculus.algebra.ranges import range_of
 from potto.calculus.algebra.rational_form import is_zero, shorter
 from potto.calculus.solving.isolate import Guard, IsolationStep, Steps, Stuck
 from potto.core.terms import (
     ONE,
     PI,
+    TWO,
     ZERO,
     Const,
     Prim,

@@ -15,7 +15,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from potto.calculus.algebra.polynomial_in import in_powers
-from potto.calculus.algebra.radicals import NAN, guarded
+from potto.calculus.algebra.radicals import guarded
 from potto.calculus.algebra.ranges import positive
 from potto.calculus.algebra.rational_form import settled, shorter
 from potto.calculus.solving.isolate import Guard, IsolationStep, Stuck, step
@@ -25,6 +25,7 @@ from potto.core.normal_form import as_term, normal_form
 from potto.core.polynomials import monomial_term, shared_by, without
 from potto.core.printer import format_term
 from potto.core.terms import (
+    NAN,
     ONE,
     ZERO,
     Const,

@@ -10,11 +10,11 @@ from collections.abc import Iterable, Sequence
 
 from msgspec import Struct
 
-from potto.calculus.algebra.radicals import NAN
 from potto.calculus.algebra.ranges import Box, range_of
 from potto.calculus.algebra.rational_form import as_term, is_zero, normal
 from potto.calculus.differentiation.derivative import NotSmooth, partial
 from potto.core.terms import (
+    NAN,
     ONE,
     ZERO,
     Array,

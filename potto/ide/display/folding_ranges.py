@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from potto.ide.model import Foldable
-from potto.ide.names.places import NOWHERE, ChunkAt, line_start, pieces_of, text_of
+from potto.ide.names.places import ChunkAt, line_start, pieces_of, text_of
 from potto.modules import is_diffeo
 from potto.modules.texts import import_starts, imports, piece
 from potto.query import Database, query
-from potto.source import Span
+from potto.source import NOWHERE, Span
 from potto.syntax import nodes, walk
 
 _FOLDED = (nodes.Integral, nodes.Let, nodes.Lambda, nodes.If, nodes.ListLiteral, nodes.Tuple, nodes.Apply, nodes.Paren)

@@ -15,10 +15,10 @@ from msgspec.structs import replace
 
 from potto.ide.names.function_arguments import fits, numbers, of_numbers
 from potto.ide.names.live_expressions import piece_lives, wrong_with
-from potto.ide.names.places import NOWHERE, PieceAt, pieces_of
+from potto.ide.names.places import PieceAt, pieces_of
 from potto.modules.texts import pieces
 from potto.query import Database, query
-from potto.source import Span
+from potto.source import NOWHERE, Span
 from potto.syntax import nodes, parse_expression
 from potto.syntax.walk import walk
 from potto.types import Diffeo, Function, TupleOf, Type, format_type, groups_of, interface, result_of

@@ -16,13 +16,12 @@ from msgspec import Struct
 
 from potto.modules import parsed
 from potto.query import Database, query
-from potto.source import Span
+from potto.source import NOWHERE, Span
 from potto.syntax import RESERVED, children, live_expressions, nodes, parse_expression, walk
 
 BinderKind = Literal["parameter", "local", "variable", "index", "loop", "size"]
 Role = Literal["bind", "use", "member", "path", "field", "keyword", "define", "module", "import", "alias", "measure"]
 _Groups = Sequence[Sequence[nodes.Parameter]]
-NOWHERE = Span(0, 0)
 _WORD = re.compile(r"[^\W\d]\w*")
 
 

@@ -15,10 +15,8 @@ from potto.ide.names.index import NameIndex, index
 from potto.modules import ChunkRef, chunk_start, chunks, is_diffeo, parsed, source
 from potto.modules.texts import defined_twice, layout, piece
 from potto.query import Database, query
-from potto.source import Span
+from potto.source import NOWHERE, Span
 from potto.syntax import ParsedChunk, nodes
-
-NOWHERE = Span(0, 0)
 
 
 class Sketch(Struct, frozen=True):

@@ -12,13 +12,13 @@ import re
 from potto.data.mistakes import DataMistake
 from potto.ide.model import Links, Location
 from potto.ide.names.documents import item_span, name_span
-from potto.ide.names.places import NOWHERE, ChunkAt, all_chunks, chunk_at
+from potto.ide.names.places import ChunkAt, all_chunks, chunk_at
 from potto.ide.names.symbols import DefinitionSymbol, FoundName, LocalSymbol, ModuleSymbol, PartSymbol, symbol_at
 from potto.modules import DefinitionTarget, dependencies, references, resolve, resolve_member, source
 from potto.modules import definition as tree_of
 from potto.modules.data import data_file
 from potto.query import Database
-from potto.source import Span
+from potto.source import NOWHERE, Span
 from potto.syntax import node_at, nodes, walk
 from potto.types import Diffeo, interface, result_of
 

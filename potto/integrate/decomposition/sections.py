@@ -27,9 +27,9 @@ from potto.integrate.pieces import Evaluator, gather, number_at, still
 from potto.integrate.rules.gauss import EPS
 from potto.kernels.cells import Array, Bools, Cell, Ints, Number, Value, pad
 
-GRID = 64
-MOST_IN_FAMILY = 100_000
-BISECTIONS = 64
+GRID = 64  # cells of a range along which nothing but values is known
+MOST_IN_FAMILY = 100_000  # roots of a periodic surface for one member
+BISECTIONS = 64  # halvings at most: what they leave of a range is less than the rounding of its ends
 # Kinks that are cut at, for each member: next to x = 0 those of sin(1/x) < y beside y < x are without number, and what
 # lies there is refined like all else that is not smooth. 256 of them take as long as 0.3 s.
 MOST_KINKS = 256

@@ -1,11 +1,10 @@
 """How large an error may be of what is 0, or nearly, because its parts cancel.
 
 Owns `Allowance`, what the integrals of an evaluation leave of it, `LeftBySums`, which is worked out when it is asked
-for, and `allowance`, that of integrals by themselves. No
-error is relative to what has cancelled. It is measured by what is added up without regard to sign: it has to be within
-`rtol` of it, and within CANCELS, which is what rounding leaves. That is no licence to lose a small summand beside large
-ones (1e16 - 1e16 + 1): where the integrand adds anything, what is added up counts as UNIT at most, so that CANCELS is
-an absolute bound.
+for, and `allowance`, that of integrals by themselves. No error is relative to what has cancelled. It is measured by
+what is added up without regard to sign: it has to be within `rtol` of it, and within CANCELS, which is what rounding
+leaves. That is no licence to lose a small summand beside large ones (1e16 - 1e16 + 1): where the integrand adds
+anything, what is added up counts as UNIT at most, so that CANCELS is an absolute bound.
 
 What stands outside of an integral scales both its error and what is added up for it: `f(t)/h^2` is as accurate as f(t).
 So an integral whose errors are within its own allowance counts as a number without one, and what is made of nothing

@@ -141,6 +141,19 @@ def _double(number: float) -> float:
         return np.inf if number > 0 else -np.inf
 
 
+def _of_one(ufunc: np.ufunc) -> Callable[[Operators], Any]:
+    return lambda own: own._computed(ufunc, own)
+
+
+def _of_two(ufunc: np.ufunc) -> tuple[Callable[[Operators, Any], Any], Callable[[Operators, Any], Any]]:
+    """An operator, and the same with what is on its left."""
+    return lambda own, other: own._computed(ufunc, own, other), lambda own, other: own._computed(ufunc, other, own)
+
+
+def _comparison(ufunc: np.ufunc) -> Callable[[Operators, object], Any]:
+    return lambda own, other: own._compared(ufunc, other)
+
+
 class Operators:
     """The operators, sums and extremes of a class that says what a ufunc makes of it, and is an array to numpy."""
 
@@ -159,56 +172,16 @@ class Operators:
         found = self._computed(ufunc, self, other)
         return bool(found) if isinstance(found, np.bool_) else found
 
-    def __lt__(self, other: object) -> Any:
-        return self._compared(np.less, other)
-
-    def __le__(self, other: object) -> Any:
-        return self._compared(np.less_equal, other)
-
-    def __gt__(self, other: object) -> Any:
-        return self._compared(np.greater, other)
-
-    def __ge__(self, other: object) -> Any:
-        return self._compared(np.greater_equal, other)
-
-    def __neg__(self) -> Any:
-        return self._computed(np.negative, self)
-
-    def __pos__(self) -> Any:
-        return self._computed(np.positive, self)
-
-    def __abs__(self) -> Any:
-        return self._computed(np.absolute, self)
-
-    def __add__(self, other: Any) -> Any:
-        return self._computed(np.add, self, other)
-
-    def __radd__(self, other: Any) -> Any:
-        return self._computed(np.add, other, self)
-
-    def __sub__(self, other: Any) -> Any:
-        return self._computed(np.subtract, self, other)
-
-    def __rsub__(self, other: Any) -> Any:
-        return self._computed(np.subtract, other, self)
-
-    def __mul__(self, other: Any) -> Any:
-        return self._computed(np.multiply, self, other)
-
-    def __rmul__(self, other: Any) -> Any:
-        return self._computed(np.multiply, other, self)
-
-    def __truediv__(self, other: Any) -> Any:
-        return self._computed(np.true_divide, self, other)
-
-    def __rtruediv__(self, other: Any) -> Any:
-        return self._computed(np.true_divide, other, self)
-
-    def __floordiv__(self, other: Any) -> Any:
-        return self._computed(np.floor_divide, self, other)
-
-    def __rfloordiv__(self, other: Any) -> Any:
-        return self._computed(np.floor_divide, other, self)
+    __lt__, __le__, __gt__, __ge__ = map(_comparison, (np.less, np.less_equal, np.greater, np.greater_equal))
+    __neg__, __pos__, __abs__ = map(_of_one, (np.negative, np.positive, np.absolute))
+    __add__, __radd__ = _of_two(np.add)
+    __sub__, __rsub__ = _of_two(np.subtract)
+    __mul__, __rmul__ = _of_two(np.multiply)
+    __truediv__, __rtruediv__ = _of_two(np.true_divide)
+    __floordiv__, __rfloordiv__ = _of_two(np.floor_divide)
+    __mod__, __rmod__ = _of_two(np.remainder)
+    __pow__, __rpow__ = _of_two(np.power)
+    __matmul__, __rmatmul__ = _of_two(np.matmul)
 
     def __divmod__(self, other: Any) -> Any:
         whole = self.__floordiv__(other)
@@ -217,24 +190,6 @@ class Operators:
     def __rdivmod__(self, other: Any) -> Any:
         whole = self.__rfloordiv__(other)
         return whole if whole is NotImplemented else (whole, self.__rmod__(other))
-
-    def __mod__(self, other: Any) -> Any:
-        return self._computed(np.remainder, self, other)
-
-    def __rmod__(self, other: Any) -> Any:
-        return self._computed(np.remainder, other, self)
-
-    def __pow__(self, other: Any) -> Any:
-        return self._computed(np.power, self, other)
-
-    def __rpow__(self, other: Any) -> Any:
-        return self._computed(np.power, other, self)
-
-    def __matmul__(self, other: Any) -> Any:
-        return self._computed(np.matmul, self, other)
-
-    def __rmatmul__(self, other: Any) -> Any:
-        return self._computed(np.matmul, other, self)
 
     def sum(self, axis: Any = None, out: Any = None, **options: Any) -> Any:
         """The sum along axes, all of them if none is named, as of an array; errors add up."""

@@ -356,15 +356,14 @@ def _combined(estimates: Sequence[Estimate], value: Any, error: Any) -> Estimate
     if np.ndim(value) == 0:
         value, error = float(value), float(error)
     changes: dict[str, Any] = {"value": value, "error": np.array(error) if np.ndim(error) else error}
-    if np.ndim(value) == 0 or any(np.shape(e.value) != np.shape(value) for e in estimates):
-        wide = _masks(estimates, np.shape(value))
-        changes |= {"shortfalls": wide, "member_converged": _members(wide, np.shape(value))}
+    shape = np.shape(value)
+    if len(estimates) > 1 or not shape or np.shape(first.value) != shape:
+        wide = _masks(estimates, shape)
+        changes |= {"shortfalls": wide, "member_converged": _members(wide, shape)}
     if len(estimates) > 1:
-        wide = _masks(estimates, np.shape(value))
         methods = {word for e in estimates for word in e.method.split("+") if word != "exact"}
         changes |= {
-            "converged": all(e.converged for e in estimates), "shortfalls": wide,
-            "member_converged": _members(wide, np.shape(value)), "evals": sum(e.evals for e in estimates),
+            "converged": all(e.converged for e in estimates), "evals": sum(e.evals for e in estimates),
             "seconds": sum(e.seconds for e in estimates), "method": "+".join(sorted(methods)) or "exact",
             "compile_seconds": sum(e.compile_seconds for e in estimates),
             "plan_seconds": sum(e.plan_seconds for e in estimates),

@@ -43,7 +43,7 @@ def format_number(value: float, error: float = 0.0) -> str:
     digits of a double.
     """
     if not math.isfinite(value):
-        return _not_finite(value)
+        return not_finite(value)
     if not math.isfinite(error):
         return f"{format_digits(value, 3)} (error unknown)"
     if error == 0 or error < abs(value) * 2.0**-54:
@@ -63,7 +63,7 @@ def format_number(value: float, error: float = 0.0) -> str:
 def format_digits(value: float, digits: int = 6) -> str:
     """`value` to so many significant digits: for labels and progress, where no error is known."""
     if not math.isfinite(value):
-        return _not_finite(value)
+        return not_finite(value)
     return _shorten(f"{value:.{digits}g}")
 
 
@@ -171,7 +171,8 @@ def _scientific(count: int, place: int, scale: int) -> str:
     return f"{_positional(count, place - scale)}{f'e{scale}' if scale else ''}"
 
 
-def _not_finite(value: float) -> str:
+def not_finite(value: float) -> str:
+    """An infinity, or what is no number, as a program writes it."""
     return "nan" if math.isnan(value) else ("inf" if value > 0 else "-inf")
 
 
@@ -223,7 +224,7 @@ def _joined(value: Any, error: Any, form: Callable[[float, float], str]) -> str:
     if isinstance(value, tuple | list):
         shown = value[:MOST_ITEMS] if isinstance(value, list) else value
         parts = [_joined(v, e, form) for v, e in zip(shown, error, strict=False)]
-        return _together(value, parts) if isinstance(value, tuple) else format_list(parts, len(value))
+        return together(value, parts) if isinstance(value, tuple) else format_list(parts, len(value))
     if isinstance(value, dict):
         return format_fields({name: _joined(item, error[name], form) for name, item in value.items()})
     if value is None:
@@ -233,7 +234,7 @@ def _joined(value: Any, error: Any, form: Callable[[float, float], str]) -> str:
     return form(float(value), float(error))
 
 
-def _together(whole: tuple[Any, ...], parts: Sequence[str]) -> str:
+def together(whole: tuple[Any, ...], parts: Sequence[str]) -> str:
     """A tuple or a record of its parts as texts."""
     return whole.written(parts) if isinstance(whole, Named) else format_tuple(parts)
 
@@ -259,7 +260,7 @@ def with_error(value: Any, error: Any) -> str:
     """`0.300 ± 0.012`, `(0.300, 1) ± (0.012, 0)`; without the error where it is zero or not known."""
     if not 0 < largest(error) < math.inf or (isinstance(value, int | float) and not math.isfinite(value)):
         if isinstance(value, tuple) and any(0 < largest(e) < math.inf for e in error):
-            return _together(value, [with_error(v, e) for v, e in zip(value, error, strict=True)])
+            return together(value, [with_error(v, e) for v, e in zip(value, error, strict=True)])
         return format_numbers(value, error)
     return " ± ".join(format_bars(value, error))
 

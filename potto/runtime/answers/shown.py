@@ -18,14 +18,14 @@ from potto.integrate.events import BOUNDLESS
 from potto.kernels.cells import Cell, Rows, Value
 from potto.runtime.answers.convergence import converged_members, steep
 from potto.runtime.answers.estimate import Estimate
-from potto.runtime.answers.named import Named
 from potto.runtime.answers.printing import (
     MOST_ITEMS,
     format_bounds,
     format_list,
     format_numbers,
-    format_tuple,
     led,
+    not_finite,
+    together,
     with_error,
 )
 from potto.runtime.evaluation.functions import Derivative
@@ -39,8 +39,7 @@ def format_value(value: Value) -> str:
     if isinstance(value, Cell):
         return format_numbers(value.v, 0.0 if value.e is None else value.e)
     if isinstance(value, tuple):
-        parts = [format_value(item) for item in value]
-        return value.written(parts) if isinstance(value, Named) else format_tuple(parts)
+        return together(value, [format_value(item) for item in value])
     if isinstance(value, list | Rows):
         size = len(value) if isinstance(value, list) else value.size
         first = [value[i] if isinstance(value, list) else value.at(i) for i in range(min(size, MOST_ITEMS))]
@@ -104,9 +103,7 @@ def json_number(value: Any) -> Any:
     if isinstance(value, np.ndarray) and value.ndim:
         return [json_number(item) for item in value]
     number = float(value)
-    if math.isfinite(number):
-        return number
-    return "nan" if math.isnan(number) else ("inf" if number > 0 else "-inf")
+    return number if math.isfinite(number) else not_finite(number)
 
 
 def estimate_json(estimate: Estimate, type: str | None = None) -> dict[str, Any]:

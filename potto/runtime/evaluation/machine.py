@@ -52,8 +52,8 @@ from potto.runtime.evaluation.functions import Chosen, Closure, Derivative, Pair
 from potto.runtime.evaluation.linker import Linker
 from potto.runtime.evaluation.record import Record
 
-DEEPEST_CALLS = 3000
-OVERDRAFT = 3
+DEEPEST_CALLS = 3000  # inside each other
+OVERDRAFT = 3  # times the budget of evaluations, up to which integrals inside of integrals go on
 # The same where the roots of a condition are searched for: 2,000 asked are some 100,000 cells, half a second or two.
 GIVEN_UP = 64
 

@@ -143,7 +143,7 @@ class Record(Struct):
     culled: int = 0
     seen: int = 0
     used: dict[tuple[str, str], Value] = {}
-    costs: Costs | None = field(default_factory=costs.books)
+    costs: Costs | None = field(default_factory=costs.if_wanted)
     gauge: Gauge | None = field(default_factory=_begun)
 
     @property

@@ -22,8 +22,8 @@ from potto.runtime.answers.allowances import NOTHING
 from potto.runtime.evaluation.machine import Machine
 from potto.runtime.evaluation.selection import by_bounds
 
-MOST_TERMS = 10_000_000
-CHUNK = 1 << 18
+MOST_TERMS = 10_000_000  # of one sum
+CHUNK = 1 << 18  # terms times members that are evaluated at once
 
 
 def total(machine: Machine, term: Sum, lo: Value, hi: Value, env: dict[str, Value], trace: Trace | None) -> Value:

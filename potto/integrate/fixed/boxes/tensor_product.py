@@ -17,9 +17,8 @@ from msgspec import Struct
 
 from potto.core.terms import Lam, Term
 from potto.integrate.columns import run_of
-from potto.integrate.fixed.lowered.box_text import NODE_ROUNDING
 from potto.integrate.fixed.straight import StraightIntegral
-from potto.integrate.panels.roundoff import LOOKED_AT, WITHIN, part_of
+from potto.integrate.panels.roundoff import LOOKED_AT, NODE_ROUNDING, WITHIN, part_of
 from potto.integrate.pieces import Evaluator, Sums, components, dense, gather, still
 from potto.integrate.rules.gauss import EPS, PEAK, gauss, truncation
 from potto.kernels.cells import Array, Bools, Cell, Ints, Value, map_arrays

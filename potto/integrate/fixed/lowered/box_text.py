@@ -18,7 +18,7 @@ from potto.integrate.fixed.axes import ENDS
 from potto.integrate.fixed.lowered.formula_text import ParameterPlace, Symbol, still
 from potto.integrate.fixed.lowered.rule_text import RuleText
 from potto.integrate.fixed.straight import StraightIntegral
-from potto.integrate.panels.roundoff import WITHIN
+from potto.integrate.panels.roundoff import NODE_ROUNDING, WITHIN
 from potto.integrate.pieces import Evaluator
 from potto.integrate.rules.gauss import EPS, PEAK, gauss
 from potto.integrate.rules.written_intervals import Names, WrittenInterval
@@ -26,7 +26,6 @@ from potto.kernels.native.operations import NotStraight
 
 # How near to 0, of its size, a surface at a corner may be before it counts as crossing.
 NEAR = 1e-9
-NODE_ROUNDING = 0.5
 # From how many nodes on `gauss.truncation` looks whether the decay slows down; then it is left to numpy.
 SLOWING = 8
 

@@ -20,9 +20,9 @@ from potto.kernels.cells import Bools, Ints, Value
 from potto.runtime.answers.convergence import rounded
 from potto.runtime.evaluation.machine import Machine
 
-START_ORDER = 11
-ORDERS = (4, 6, 10, 14, 18)
-PILOTS = 64
+START_ORDER = 11  # nodes of a panel to begin with
+ORDERS = (4, 6, 10, 14, 18)  # those that are tried for a large batch
+PILOTS = 64  # members that they are tried on
 BATCH = 4096  # members integrated at once
 FEW = 64  # members for which it does not pay to look for those that nothing cuts
 MOST_AXES = 2  # of a product rule for one member: with 4,096 nodes 14 of each of three, which hardly ever are enough
