@@ -19,6 +19,7 @@ from msgspec.structs import replace
 from potto.diagnostics import PottoError, declare
 from potto.kernels.cells import Cell, Rows, Value, listed
 from potto.kernels.errors import wrong_call
+from potto.kernels.memory import copied
 from potto.python.arrays import answers_in, batch_shapes, halves, holds_functions, over_batch
 from potto.runtime.answers.estimate import Estimate
 from potto.runtime.answers.named import alike
@@ -130,9 +131,8 @@ class Batch(Struct, frozen=True):
         count, array = int(np.prod(self.shape)), np.asarray(part, dtype=float)
         if array.ndim > 1 and len(array) == count:  # arrays of members, put together from tiles
             return array.reshape(*self.shape, *array.shape[1:])
-        if own and array.size == count:
-            return array.reshape(self.shape)
-        return np.broadcast_to(array.reshape(-1), (count,)).reshape(self.shape).copy()
+        whole = np.broadcast_to(array.reshape(-1), (count,)).reshape(self.shape)
+        return array.reshape(self.shape) if own and array.size == count else copied(whole)
 
 
 def batch_of(arguments: Iterable[tuple[str, Any]]) -> Batch:
@@ -149,7 +149,7 @@ def batch_of(arguments: Iterable[tuple[str, Any]]) -> Batch:
 
 def flattened(given: Any, batch: Batch) -> Any:
     """What calls were given, with every array in it as one row over the batch."""
-    return _mapped(given, lambda array: batch.flat(array.astype(np.float64)), batch.rows)
+    return _mapped(given, lambda array: batch.flat(copied(array)), batch.rows)
 
 
 def cut(given: Any, members: slice) -> Any:
@@ -269,7 +269,7 @@ def _array(name: str, argument: np.ndarray[Any, Any], batch: Batch) -> Value:
         raise no_kind(name, argument, "an array must hold real numbers")
     if argument.ndim == 0:
         return Cell(float(argument))
-    return Cell(batch.flat(argument.astype(np.float64)))
+    return Cell(batch.flat(copied(argument)))
 
 
 def _estimate(name: str, argument: Estimate, batch: Batch, to_function: ToFunction) -> Value:

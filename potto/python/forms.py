@@ -5,7 +5,7 @@ Owns `by_name`, `as_matrix`, `must_match`, `weighted`, `in_lists` and `form_of`.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from typing import Any, cast
 
@@ -42,17 +42,19 @@ def bounds_of(cell: Cell) -> tuple[Number | None, ...]:
 def by_name(numbers: list[Any], given: dict[str, Value], whole: bool) -> tuple[Any, ...]:
     """The derivatives in the form of the parameters; `whole`: those by all elements of an array are one array."""
     rest = iter(numbers)
+    return tuple(_formed(value, rest, whole) for value in given.values())
 
-    def form(value: Value) -> Any:
-        if isinstance(value, tuple):
-            return tuple(form(item) for item in value)
-        if not isinstance(value, Rows):
-            return next(rest)
-        if not whole:
-            return [form(row) for row in value.rows()]
-        return _by_elements(value, [next(rest) for _ in all_cells(value)])
 
-    return tuple(form(value) for value in given.values())
+def _formed(value: Value, rest: Iterator[Any], whole: bool) -> Any:
+    """The next derivatives in the form of one parameter. (Within `by_name` it would hold itself, and so the derivatives
+    of a batch, until Python looks for such things.)"""
+    if isinstance(value, tuple):
+        return tuple(_formed(item, rest, whole) for item in value)
+    if not isinstance(value, Rows):
+        return next(rest)
+    if not whole:
+        return [_formed(row, rest, whole) for row in value.rows()]
+    return _by_elements(value, [next(rest) for _ in all_cells(value)])
 
 
 def _by_elements(value: Rows, slopes: list[Any]) -> list[Any]:

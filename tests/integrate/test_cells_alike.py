@@ -369,17 +369,6 @@ def test_errors_of_zero_are_nothing_that_machine_code_reads() -> None:
     assert places_of("ab", unsure) != places_of("ab", bare)
 
 
-def test_lines_between_samples_are_cells_alike() -> None:
-    """Over the corner of a cube w comes to c^5/5!: each line takes the two nodes that are exact for its polynomial, at
-    the most, where panels took eight. 4,096 samples: bars of a tenth are what 16 scramblings agree to."""
-    text = "def f(c) integral ([0, 1], [0, 1], [0, 1], [0, 1]) [x + y + z + w < c]*w d(x, y, z, w)"
-    with potto.settings(method="qmc", samples=4096):
-        found = potto.grad(potto.compile(text).f, "c")(1.0)
-    assert abs(found.value - 1 / 120) <= found.error < 0.1 / 120
-    assert abs(found.tangent - 1 / 24) <= found.tangent_error < 0.1 / 24
-    assert found.evals <= 2 * 4096
-
-
 @pytest.mark.parametrize("backend", ["numpy", "native"])
 def test_lines_along_an_axis_are_cut_like_others(backend: Any) -> None:
     """Half of them are level or upright, and meet the other variable nowhere: they are not gone over one by one."""

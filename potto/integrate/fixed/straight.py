@@ -26,20 +26,23 @@ from potto.core.terms import (
     function_of,
     postorder,
     rebuild,
+    substitute,
     tuple_,
+    var,
 )
 from potto.integrate.fixed.root_choices import choices_of, chosen, smooth
 from potto.integrate.fixed.steps.stays import PRICE, Stay
 from potto.integrate.fixed.steps.step_integral import StepIntegral, step_integral
 from potto.integrate.levels import LevelPlan
 from potto.integrate.rules.complex_enclosures import enclosable, known_to_discs
-from potto.kernels.cells import Ints
+from potto.kernels.cells import Cell, Ints, Value
 
 MOST_VARIABLES, MOST_CUTS, MOST_TERMS = 3, 13, 600
 # Up to how many cuts cells are looked at one by one (`proved_sums`): with four a call at the same numbers takes 85 us
 # so and 137 by step functions, with twelve 160 and 155; where numbers change 1.1 ms and 0.14, and 5 and 0.16.
 FEW_CUTS = 4
 MOST_CHOICES = 4  # each of which may double the number of plans, where step functions do not do without
+AT_REST = "'rest"  # behind the name of a parameter: the number that it is
 # Enough for the number of a row in a frame: two bounds, then cuts.
 ROW_BITS = (MOST_CUTS + 1).bit_length()
 RowNumbers = NDArray[np.integer[Any]]  # numbers of rows of frames
@@ -77,7 +80,7 @@ class StraightIntegral(Struct, frozen=True, dict=True, eq=False):
     texts: dict[Any, Any] = {}
     choices: Lam | None = None
     held: tuple[tuple[Term, bool], ...] = ()
-    plans: dict[tuple[bool, ...], StraightIntegral] = {}
+    plans: dict[Any, StraightIntegral] = {}
     steps: StepIntegral | None = None
     stay: Stay | None = None
 
@@ -101,6 +104,30 @@ class StraightIntegral(Struct, frozen=True, dict=True, eq=False):
             held = tuple(zip(children(self.choices.body), sides, strict=True))
             found = self.plans[sides] = _with_choices(self, held)
         return found
+
+    def resting(self, surfaces: frozenset[Term]) -> StraightIntegral | None:
+        """The plan with cuts that stay where they are, of surfaces whose motion counts elsewhere; None where cuts of
+        others, or bounds, have the same formula, or where formulas are yet to be chosen. It asks for more parameters
+        (`with_resting`)."""
+        if not surfaces:
+            return self
+        if self.choices is not None or self.steps is not None:
+            return None
+        found = self.plans.get(surfaces)
+        if found is None:
+            rows = []
+            for level, shared in zip(self.jumps, self.shared, strict=True):
+                own = {row for surface, those in level if surface in surfaces for row in those}
+                if own & shared.union(row for surface, those in level if surface not in surfaces for row in those):
+                    return None
+                rows.append(own)
+            found = self.plans[surfaces] = _at_rest(self, rows) if any(rows) else self
+        return found
+
+    def with_resting(self, env: Mapping[str, Value]) -> dict[str, Value]:
+        """An environment with the parameters as they are without their motion, those that `resting` cuts ask for."""
+        asked = ((name, env.get(name.removesuffix(AT_REST))) for name in self.names if name not in env)
+        return {**env, **{name: Cell(cell.v, cell.e) for name, cell in asked if isinstance(cell, Cell)}}
 
 
 def straight(term: Integral, body: Term, levels: Sequence[LevelPlan]) -> StraightIntegral | None:
@@ -168,6 +195,19 @@ def _with_choices(plan: StraightIntegral, held: tuple[tuple[Term, bool], ...]) -
     names = tuple(sorted(free))
     return StraightIntegral(
         plan.variables, frames, jumps, turning, shared, plan.body, plan.surfaces, names, held=held, steps=plan.steps
+    )
+
+
+def _at_rest(plan: StraightIntegral, rows: Sequence[set[int]]) -> StraightIntegral:
+    """The plan with some rows of each variable's frame as formulas of numbers that do not move."""
+    twins: dict[str, Term] = {name: var(name + AT_REST) for name in plan.names}
+    frames = tuple(
+        function_of(tuple_([substitute(item, twins) if row in own else item for row, item in enumerate(items)]))
+        for items, own in zip(plan.items, rows, strict=True)
+    )
+    free = plan.body.free.union(*(frame.body.free for frame in frames)) - set(plan.variables)
+    return StraightIntegral(
+        plan.variables, frames, plan.jumps, plan.turning, plan.shared, plan.body, plan.surfaces, tuple(sorted(free))
     )
 
 

@@ -322,9 +322,10 @@ class _Run(Struct, dict=True):
     def lines(self, point: Point, sides: dict[int, Mask], n: int) -> Sums:
         """The integrals over the variable that is left to quadrature: those by one rule that are plain, as most are."""
         plan, machine, env = self.plan, self.iteration.machine, point.env
+        line = None if plan.line is None or sides else plan.line.resting(self.iteration.still)
         found = None
-        if plan.line is not None and not (sides or self.iteration.still):
-            found = by_shapes(plan.line, plan.degrees[-1:], machine, env, n, False)
+        if line is not None:
+            found = by_shapes(line, plan.degrees[-1:], machine, line.with_resting(env), n, False)
         done = np.zeros(n, dtype=bool) if found is None else found.done
         rest = np.flatnonzero(~done)
         if found is not None and not rest.size:

@@ -38,6 +38,8 @@ from potto.runtime.answers.allowances import Allowed, allowance
 SPECK = 1e-15
 # From which part of a value on an error is more than rounding, and up to which it is nothing else.
 LOST, ONLY_ROUNDED = 0.1, 1e-6
+# Numbers of a batch that are looked at together.
+AT_ONCE = 1 << 14
 
 # Why answers are not as accurate as asked for, and of which members of a batch: a mask, or True for all of them.
 Shortfalls = dict[Shortfall, Any]
@@ -74,11 +76,26 @@ def missing(term: Integral, sums: Sums, settings: Settings, env: dict[str, Value
 
 
 def precise(numbers: Number | None, errors: Number | None, rtol: float) -> bool:
-    """Whether each number is there, finite and known to this part of it."""
+    """Whether each number is there, finite and known to this part of it.
+
+    Of many numbers some at a time, whose sizes stay in the cache: in memory they take six times as long.
+    """
     if numbers is None or errors is None:
         return False
-    size = np.abs(numbers)
-    return bool(np.all(errors <= rtol * size) and np.all(size < np.inf))
+    if numbers.__class__ is not np.ndarray or numbers.shape != np.shape(errors):
+        size = np.abs(numbers)
+        return bool(np.all(errors <= rtol * size) and np.all(size < np.inf))
+    flat, off = numbers.reshape(-1), np.reshape(errors, -1)  # copies, where they have gaps: never of large batches
+    room = np.empty(min(flat.size, AT_ONCE))
+    for start in range(0, flat.size, AT_ONCE):
+        some = flat[start : start + AT_ONCE]
+        size = np.abs(some, out=room[: some.size])
+        if not size.max() < np.inf:
+            return False
+        size *= rtol
+        if not (off[start : start + AT_ONCE] <= size).all():
+            return False
+    return True
 
 
 def rounded(sums: Sums) -> Bools:
@@ -95,11 +112,11 @@ def missed(value: Any, error: Any, allowed: Allowed, settings: Settings, drawn: 
     rtol = settings.asked(drawn)
     if isinstance(value, float) and isinstance(error, float) and error <= rtol * abs(value) < np.inf:
         return {}
+    if precise(value, error, rtol):
+        return {}
     v, e = np.broadcast_arrays(np.abs(np.asarray(value, dtype=float)), np.asarray(error, dtype=float))
-    limit = np.asarray(rtol * v)
-    fine = np.asarray(e <= limit)
-    if not limit.max(initial=0.0) < np.inf:  # seldom, in large batches
-        fine &= limit < np.inf
+    with np.errstate(over="ignore"):
+        fine = np.asarray((e <= rtol * v) & (v < np.inf))
     if fine.all():
         return {}
     bad = np.asarray(~fine)

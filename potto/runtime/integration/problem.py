@@ -48,26 +48,28 @@ def linked(env: dict[str, Value]) -> tuple[Functions, dict[str, Value]]:
     with these."""
     functions: Functions = {}
     extended: dict[str, Value] = dict(env)
-
-    def add(name: str, function: Closure) -> None:
-        derivative = isinstance(function, Derivative)
-        while isinstance(function, Derivative):
-            function = function.primal
-        renamed: dict[str, Term] = {}
-        for inner, value in function.captured.items():
-            own = f"{name}@{inner}"
-            renamed[inner] = var(own)
-            extended[own] = value
-            if isinstance(value, Closure):
-                add(own, value)
-        term = substitute(function.lam, renamed)
-        assert isinstance(term, Lam)
-        functions[name] = deriv(term) if derivative else term
-
     for name, value in env.items():
         if isinstance(value, Closure):
-            add(name, value)
+            _link(name, value, functions, extended)
     return functions, extended
+
+
+def _link(name: str, function: Closure, functions: Functions, env: dict[str, Value]) -> None:
+    """Add a function under this name, with what it captured under names of their own. (Within `linked` it would hold
+    itself, and so the arrays of a batch, until Python looks for such things.)"""
+    derivative = isinstance(function, Derivative)
+    while isinstance(function, Derivative):
+        function = function.primal
+    renamed: dict[str, Term] = {}
+    for inner, value in function.captured.items():
+        own = f"{name}@{inner}"
+        renamed[inner] = var(own)
+        env[own] = value
+        if isinstance(value, Closure):
+            _link(own, value, functions, env)
+    term = substitute(function.lam, renamed)
+    assert isinstance(term, Lam)
+    functions[name] = deriv(term) if derivative else term
 
 
 class Known(Struct):

@@ -20,6 +20,7 @@ from potto.integrate.fixed.lowered.rule_text import NAME
 from potto.integrate.pieces import Evaluator, Sums
 from potto.kernels.cells import Array, Bools, Ints, Value
 from potto.kernels.making import counts
+from potto.kernels.memory import room
 from potto.kernels.native.objects import Loaded
 from potto.kernels.native.points import address
 from potto.kernels.native.promotion import Promotion
@@ -76,7 +77,7 @@ class LoweredBoxes(Struct, frozen=True):
         constants = np.concatenate(([0.5 * machine.rtol, 0.5 * machine.atol], constants))
         axes = [axis(order, tuple(range(order)), (False, False), True) for order in self.orders]
         least = max(batch, LANES)
-        out = np.empty((rows_of(m * k1), least))
+        out = room(rows_of(m * k1), least)
         columns = [whole(column, least) for column in (*arrays, *sides)]
         for start, stop in parts(least, AT_ONCE):
             frame = frame_of(out[:, start:stop], axes, [column[start:stop] for column in columns])
