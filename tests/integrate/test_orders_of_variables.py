@@ -102,3 +102,14 @@ def test_a_torus_is_filled_up_to_a_bound_that_moves() -> None:
     filled = 2 * PI * (t * w + r**2 * (math.asin(t / r) + PI / 2))
     assert abs(answer.value - filled) <= answer.error <= 1e-9
     assert abs(answer.tangent - 4 * PI * w) <= answer.tangent_error <= 1e-9
+
+
+def test_no_order_goes_on_long_before_others_are_tried() -> None:
+    """Along x and y the section at z has the area s - s log s, s = t - z, and a long tail besides: with z outermost
+    that takes 100,000 evaluations, with x outermost 36. What came to an end is tried first the next time."""
+    f = potto.deriv(potto.compile("def f(t) integral ([0, 1], [0, 1], [0, 1]) [x*y + z < t] d(z, x, y)").f)
+    for t, most in ((0.8, 10_000), (0.7, 1_000)):
+        answer = f((t, 1.0))
+        assert abs(answer.value - t**2 * (3 - 2 * math.log(t)) / 4) <= answer.error <= 1e-13
+        assert abs(answer.tangent - t * (1 - math.log(t))) <= answer.tangent_error <= 1e-13
+        assert answer.evals <= most

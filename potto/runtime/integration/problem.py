@@ -77,7 +77,8 @@ class Known(Struct):
     steps that eliminate its variables; the parameters that decide its course; its sides. Empty where nobody has asked.
 
     key: what it is kept under on disk. packed: the plans as they are kept. written: its integrand with calls carried
-    out, looks: how often it was looked at without a plan.
+    out, looks: how often it was looked at without a plan. ended: the order of its variables in which a trial came to an
+    end last time, and the evaluations that it took.
     """
 
     key: bytes = b""
@@ -88,6 +89,7 @@ class Known(Struct):
     sided: list[Sided | None] = []
     written: list[Term] = []
     looks: int = 0
+    ended: tuple[Integral, int] | None = None
 
 
 _known: OrderedDict[Any, Known] = OrderedDict()

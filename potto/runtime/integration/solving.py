@@ -153,6 +153,8 @@ def along_cuts(problem: Problem) -> Sums:
             found = best((found, attempted(problem, order, LONGER * max(most, found.taken))))
         along = found.events.every(Degenerate)
         if not along and not found.stopped and (most is None or found.known):
+            if most is not None:
+                problem.known.ended = order, found.taken
             return finished(problem, found)
         if not along:
             stopped.append(found)

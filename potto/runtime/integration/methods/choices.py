@@ -32,10 +32,12 @@ TRIAL, TRIAL_FACTOR = 50_000, 6
 # One in so many of all evaluations that there are may go into a trial, and into all of them together: the nodes that an
 # order begins with may be more than was meant for it.
 TRIED, ALL_TRIED = 64, 8
-# One in so many evaluations of a trial goes into the order as it is written before others are compared by where they
-# cut: a ball takes 1,500, a torus 39,000 in the best order and a million in others. Up to how many cuts they are: of
-# five balls, with 178, the plans for all orders would take five seconds.
-GLANCE, COMPARED = 10, 40
+# One in so many evaluations of a trial goes into each order that does without searches, in turn, before any gets all: a
+# ball takes 1,500, a torus 39,000 in the best order and a million in others, and of `[x*y + z < t]` an order with z
+# outermost takes 100,000, others 36. Up to how many cuts orders are compared: of five balls, with 178, the plans for
+# all would take five seconds.
+GLANCES, COMPARED = (100, 20), 40
+AGAIN = 4  # times what an order took is what it gets when it is tried first the next time
 
 
 def too_many(problem: Problem) -> bool:
@@ -137,8 +139,9 @@ def tried(problem: Problem, most: int | None) -> Iterator[tuple[Integral, int | 
     """The orders to try, each with the evaluations that it may take, and whether it gets more at once if that promises
     something. most: those of a trial.
 
-    Of three variables those orders come first that cut the outermost one at the fewest places, after a glance at the
-    one that is written if that does without searches.
+    Of three variables those orders come first that cut the outermost one at the fewest places. What the best of them
+    takes is not told by that; so where nothing is searched for each gets few evaluations before any gets many, the one
+    that is written first. That in which a trial came to an end at other parameters goes before them all.
     """
     term, levels = problem.term, problem.plan().levels
     cuts = sum(len(own.level.cuts) for own in levels)
@@ -147,9 +150,19 @@ def tried(problem: Problem, most: int | None) -> Iterator[tuple[Integral, int | 
     if most is None or written or len(term.variables) != MOST_LEVELS or not _movable(term):
         yield from ((order, most, True) for order in preferred(problem))
         return
+    if problem.known.ended is not None:
+        order, taken = problem.known.ended
+        yield order, min(most - 1, AGAIN * taken), False
     if not any(own.searched or own.families or own.level.critical for own in levels):
-        yield term, most // GLANCE, False
+        for part in GLANCES:
+            yield from ((order, most // part, False) for order in _written_first(problem))
     yield from ((order, most, False) for order in _fewest_cuts(problem))
+
+
+def _written_first(problem: Problem) -> Iterator[Integral]:
+    """The order that is written, then those with other variables innermost."""
+    yield problem.term  # the others' plans are not made if that one is settled
+    yield from (order for order in _fewest_cuts(problem) if order.variables[-1] != problem.term.variables[-1])
 
 
 def _searched(problem: Problem, order: Integral) -> tuple[int, int]:
