@@ -369,7 +369,10 @@ def _numbers(plan: StraightIntegral, env: Mapping[str, Value]) -> dict[str, floa
     values: dict[str, float] = {}
     for name in plan.names:
         cell = env.get(name)
-        if not isinstance(cell, Cell) or cell.arrays() or not math.isfinite(cell.v):
+        if not isinstance(cell, Cell):
+            return None
+        plain = cell.v.__class__ is float and cell.e is None and not cell.t  # as most are
+        if (not plain and cell.arrays()) or not math.isfinite(cell.v):
             return None
         values[name] = float(cell.v)
     return values

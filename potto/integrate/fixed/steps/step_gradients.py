@@ -31,6 +31,8 @@ from potto.kernels.whole import PAIRWISE
 ENDS = 2
 # A derivative, how far off it is, and what it is when nothing cancels: (3, ...).
 Slopes = Array
+Slope = tuple[float, float, float]
+NONE: Slope = 0.0, 0.0, 0.0
 
 
 @np.errstate(all="ignore")
@@ -43,7 +45,7 @@ def step_gradient(
     taped = {name: Cell(cell.v, cell.e, (seeds.get(name),)) for name, cell in env.items()}  # type: ignore[arg-type]
     frame = numbers_at(plan.frame, machine.taped(), taped)
     levels = levels_of(plan, machine.taped(), taped)
-    still: dict[str, Value] = {name: Cell(cell.v, cell.e) for name, cell in env.items()}
+    still: dict[str, Value] = {name: Cell(cell.v, cell.e) if cell.t else cell for name, cell in env.items()}
     cells = cells_between(plan, frame, levels, machine, still, 0)
     if not cells.fine:
         return None
@@ -69,8 +71,7 @@ def step_gradient(
     for name, parts in zip(own, np.moveaxis(slopes[:, ENDS + len(rising) :], 1, 0), strict=True):
         answers.append(((seeds[name],), _total(parts)))
     found = _to_parameters(answers)
-    rows = [_total(value), *(found.get(seed, np.zeros(3)) for seed in seeds.values())]
-    number, error, gross = np.transpose(rows).tolist()
+    number, error, gross = map(list, zip(_total(value).tolist(), *(found.get(seed, NONE) for seed in seeds.values())))
     nodes = order * cells.width.shape[-1]
     return MovingTotals(number, error, gross, nodes) if all(map(math.isfinite, (*number, *error))) else None
 
@@ -149,7 +150,7 @@ def _by_heights(plan: StepIntegral, own: int, cells: StepCells, parts: Slopes) -
     return slopes
 
 
-def _to_parameters(answers: Sequence[tuple[tuple[object, ...], Slopes]]) -> dict[Node, Slopes]:
+def _to_parameters(answers: Sequence[tuple[tuple[object, ...], Slopes]]) -> dict[Node, Slope]:
     """What a tape makes of derivatives by the numbers that it led to."""
     nodes, slopes = [t for t, _ in answers], np.array([part for _, part in answers]).tolist()
     found = adjoints([
@@ -157,4 +158,4 @@ def _to_parameters(answers: Sequence[tuple[tuple[object, ...], Slopes]]) -> dict
         for t, (number, error, gross) in zip(nodes, slopes, strict=True)
         if t and isinstance(t[0], Node)
     ])  # fmt: skip
-    return {seed: np.array((x.value, x.error, x.size)) for seed, x in found.items()}
+    return {seed: (float(x.value), float(x.error), float(x.size)) for seed, x in found.items()}
