@@ -56,9 +56,11 @@ def summands() -> Finding:
     written = potto.deriv(potto.compile(f"def f(t) {INTEGRAL} ({body}) d(x)").f)
     looped = potto.deriv(potto.compile(f"def f(t) {INTEGRAL} sum k in 1..{n} (k*[x < k*t/{n + 1}]) d(x)").f)
     exact = math.fsum(k * k / (n + 1) for k in range(1, n + 1))
-    answer, seconds = once(lambda: written((0.9, 1.0)))
-    ratio = seconds / once(lambda: looped((0.9, 1.0)))[1]
-    off = relative(answer.tangent, exact)
+    seconds = other = math.inf
+    for _ in range(3):  # machine code is made meanwhile, for both
+        answer, took = once(lambda: written((0.9, 1.0)))
+        seconds, other = min(seconds, took), min(other, once(lambda: looped((0.9, 1.0)))[1])
+    ratio, off = seconds / other, relative(answer.tangent, exact)
     met = ratio <= SAME and off <= 1e-12 and covered(answer, 0.9 * exact, exact)
     return Finding(answer.value, answer.error, off, answer.evals, seconds, ratio, met)
 
