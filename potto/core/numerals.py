@@ -26,7 +26,7 @@ class Numbers(Enum):
 def numeral(value: float, numbers: Numbers) -> str:
     """A number as Potto source; as a fraction only if that is the same double."""
     simple = simple_fraction(value) if numbers is Numbers.FRACTIONS else None
-    return repr(value).removesuffix(".0") if simple is None else str(simple)
+    return repr(value).removesuffix(".0").replace("e-0", "e-") if simple is None else str(simple)
 
 
 def simple_fraction(value: float) -> Fraction | None:

@@ -22,10 +22,10 @@ COLLECTED = [
     ),
     ("integral [0, 3] [x^2 - 3*x + t < 0] d(x)", "if [t > 0 and t < 9/4] then -2*dt/sqrt(9 - 4*t) else 0"),
     # squares
-    ("integral [c/4, 1] x*[(x - t)^2 < 0.04] d(x)", "[(c - 4*t)^2 < 0.64]"),
+    ("integral [c/4, 1] x*[(x - t)^2 < 0.04] d(x)", "[(c/4 - t)^2 < 0.04]"),
     (
         "sum i in 0..2 (integral [0, 1] [x^2 < t*c/(i + 1)]*x d(x))",
-        "(t*dc + c*dt)/(2*(i + 1))*[c*t/(i + 1) > 0 and c*t/(i + 1) < 1]",
+        "(1/(i + 1)*[c*t/(i + 1) > 0 and c*t/(i + 1) < 1]))/2",
     ),
     # what does not depend on the variables before the integral
     ("integral ([0, 1], [0, 1]) cos(t)*[x + y < t] d(x, y)", "cos(t)*(integral [0, 1] [x < t and t < x + 1] d(x))"),

@@ -142,8 +142,8 @@ def test_each_surface_of_a_sum_has_its_own_index() -> None:
     """
     ((item,),) = [explain(text, "stairs").integrals]
     (boundary,) = item.deltas
-    assert boundary.startswith("sum k") and boundary.endswith(")")
-    inside = boundary[boundary.index("(") :]
+    assert boundary.startswith("-dt*(sum k") and boundary.endswith("))")
+    inside = boundary.removeprefix("-dt*")
     assert "delta(" in inside and inside.count("(") == inside.count(")")
 
 

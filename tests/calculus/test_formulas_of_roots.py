@@ -17,10 +17,10 @@ PERIODIC = [
     (
         "integral [0, 10] [sin(3*x) < t]*x d(x)",
         "sum k in 0..5 (if [t > -1 and t < 1 and asin(t) + 2*pi*k > 0 and asin(t) + 2*pi*k < 30]"
-        " then (asin(t) + 2*pi*k)*dt/(9*sqrt(1 - t^2)) else 0)",
+        " then (asin(t) + 2*pi*k)/sqrt(1 - t^2) else 0)",
     ),
-    ("integral [0, 3] [tan(x) < t]*x d(x)", "sum k in 0..1 ((atan(t) + pi*k)*dt/(t^2 + 1)"),
-    ("integral [0, 7] [sin(x^2) < t]*x d(x)", "dt/(2*sqrt(1 - t^2))"),
+    ("integral [0, 3] [tan(x) < t]*x d(x)", "(atan(t)*[t > 0] + (atan(t) + pi)*[atan(t) + pi < 3])*dt/(t^2 + 1)"),
+    ("integral [0, 7] [sin(x^2) < t]*x d(x)", "1/sqrt(1 - t^2)"),
     ("integral [1, 4] [cos(t*x) < 0.4]*x^2 d(x)", "..floor("),
     ("integral [0, 2] [cos(2*x + t) < 0]*exp(x) d(x)", "(-1)^k"),
     ("integral [0, 7] [sin(x) + cos(x) < t]*x d(x)", "acos(t/sqrt(2))"),

@@ -155,8 +155,8 @@ def test_what_all_summands_are_multiples_of_is_cancelled() -> None:
     file = library.put("<text>", "def f(a, b, m, s) (erf((b - m)/(s*sqrt(2))) - erf((a - m)/(s*sqrt(2))))/2\n")
     shown = explain_derivative(library.db, file, "f").tangent
     assert shown == (
-        "(exp(-(b - m)^2/(2*s^2))*(s*db + (m - b)*ds - s*dm)"
-        " + exp(-(a - m)^2/(2*s^2))*((a - m)*ds + s*dm - s*da))/(s^2*sqrt(2*pi))"
+        "(exp(-(b - m)^2/(2*s^2))*(s*(db - dm) + (m - b)*ds)"
+        " + exp(-(a - m)^2/(2*s^2))*(s*(dm - da) + (a - m)*ds))/(s^2*sqrt(2*pi))"
     )
 
 
@@ -221,11 +221,11 @@ def test_the_state_of_a_fold_has_the_fields_of_the_first_one() -> None:
 @pytest.mark.parametrize(
     ("program", "read"),
     [
-        ("sum i in 1..5 (integral [0, 1] [x*abs(i) < t/i] d(x))", "sum i in 1..5 (dt/i^2*[t > 0 and t < i^2])"),
-        ("sum i in -5..-1 (integral [0, 1] [x*i < t] d(x))", "sum i in -5..-1 (-dt/i*[t < 0 and i < t])"),
-        ("sum i in -1..5 (integral [0, 1] [x*i < t] d(x))", "sum i in -1..5 (dt/abs(i)*[t*i > 0 and t/i < 1])"),
+        ("sum i in 1..5 (integral [0, 1] [x*abs(i) < t/i] d(x))", "dt*(sum i in 1..5 (1/i^2*[t > 0 and t < i^2]))"),
+        ("sum i in -5..-1 (integral [0, 1] [x*i < t] d(x))", "-dt*(sum i in -5..-1 (1/i*[t < 0 and i < t]))"),
+        ("sum i in -1..5 (integral [0, 1] [x*i < t] d(x))", "dt*(sum i in -1..5 (1/abs(i)*[i*t > 0 and t/i < 1]))"),
         ("sum i in 1..5 (sum j in i..9 (integral [0, 1] [j*x < t] d(x)))",
-         "sum i in 1..5 (sum j in i..9 (dt/j*[t > 0 and t < j]))"),
+         "dt*(sum i in 1..5 (sum j in i..9 (1/j*[t > 0 and t < j])))"),
     ],
 )  # fmt: skip
 def test_an_index_has_the_sign_of_its_range(program: str, read: str) -> None:

@@ -63,7 +63,7 @@ f = global_("/somewhere/m.po", "f")
         (pow_(pow_(x, y), t), "(x^y)^t"),
         (pow_(x, pow_(y, t)), "x^y^t"),
         (pow_(add(x, y), HALF), "(x + y)^0.5"),
-        (mul(PI, const(1e-07)), "pi*1e-07"),
+        (mul(PI, const(1e-07)), "pi*1e-7"),
         (neg(INF), "-inf"),
         (const(0.1), "0.1"),
         (prim("atan2", y, add(x, ONE)), "atan2(y, x + 1)"),

@@ -1,9 +1,8 @@
 """Iverson brackets as conditions, in as few and as plain comparisons as they can be told.
 
-Owns `Inequality`, `conditions`, `fewer`, `between`, `plainer`, `sign_where`, `two_sides`, `constant`, `implies`,
-`bracket`. A root is compared by squares or by what it is the root of, factors that do not change a sign are left out,
-and so is what another condition implies. What two conditions hold between numbers stands between them:
-`-1 < c + x < 0` is c < -x and c + x + 1 > 0.
+Owns `Inequality`, `conditions`, `fewer`, `plainer`, `sign_where`, `two_sides`, `constant` and `implies`; how
+they are written is in `bounds`. A root is compared by squares or by what it is the root of, factors that do not change
+a sign are left out, and so is what another condition implies.
 """
 
 from __future__ import annotations
@@ -11,15 +10,15 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from fractions import Fraction
 from functools import lru_cache
-from math import gcd, isqrt, lcm
+from math import isqrt
 
 from msgspec import Struct
 
 from potto.calculus.algebra.ranges import Box, range_of
 from potto.calculus.algebra.rational_form import as_term, equal, normal
+from potto.calculus.explanation.inverse_angles import angle_bounds
 from potto.calculus.explanation.squares import root_of_square
 from potto.core.polynomials import Polynomial, number, shared_by, without
-from potto.core.printer import format_term
 from potto.core.terms import (
     ONE,
     ZERO,
@@ -28,20 +27,15 @@ from potto.core.terms import (
     Term,
     Var,
     add,
-    branch,
     const,
     div,
     mul,
     neg,
-    pow_,
     prim,
     sub,
 )
 
 _ANYWHERE: Box = {}
-
-_MONOMIALS = 6  # of what is written anew between its bounds
-_COEFFICIENT = 64  # the largest; multiples of decimal fractions are no plainer
 
 
 class Inequality(Struct, frozen=True):
@@ -87,74 +81,6 @@ def fewer(known: Iterable[Inequality], box: Box = _ANYWHERE) -> list[Inequality]
                 found = [other for other in found if not implies(plain, other)]
                 found.append(plain)
     return found
-
-
-def bracket(known: Sequence[Inequality]) -> Term:
-    """1 where all conditions hold, else 0."""
-    whole: Term = ONE
-    for item in reversed(between(known)):  # the first one is asked first
-        whole = branch((item.surface,), item.strict, whole, ZERO)
-    return whole
-
-
-class _Bound(Struct, frozen=True):
-    """What a condition says of a polynomial without a constant whose coefficients are integers without a common factor:
-    that it is above `number`, or if `turned`, below it. scaled: whether the condition said so of a multiple of it."""
-
-    of: Polynomial
-    number: Fraction
-    turned: bool
-    scaled: bool
-
-
-def between(known: Sequence[Inequality]) -> list[Inequality]:
-    """The same conditions in their order: two bounds of one thing alike and beside each other, the lower one first, so
-    that it stands between them; and none of a fraction of anything."""
-    bounds = [_bound(item.surface) for item in known]
-    found: list[Inequality] = []
-    done: set[int] = set()
-    for i, bound in enumerate(bounds):
-        if i in done:
-            continue
-        alike = [(j, b) for j, b in enumerate(bounds) if b and bound and b.of == bound.of]
-        surfaces = {j: _surface(b) for j, b in alike if b.scaled or len(alike) > 1}
-        for j in [j for j, b in alike if not b.turned] + [j for j, b in alike if b.turned] or [i]:
-            surface = surfaces.get(j)
-            found.append(known[j] if surface is None else Inequality(surface, known[j].strict))
-            done.add(j)
-    return found
-
-
-def _bound(surface: Term) -> _Bound | None:
-    found = normal(surface)
-    if found is None or set(found.below) != {()}:
-        return None
-    top = {m: Fraction(c) / found.below[()] for m, c in found.top.items()}
-    offset = top.pop((), Fraction(0))
-    if not 0 < len(top) <= _MONOMIALS:
-        return None
-    scale = Fraction(gcd(*(c.numerator for c in top.values())), lcm(*(c.denominator for c in top.values())))
-    below = sum(c < 0 for c in top.values())
-    first = min(top, key=lambda m: [(format_term(a), n) for a, n in m])
-    turned = 2 * below > len(top) or (2 * below == len(top) and top[first] < 0)
-    whole = {m: c / (-scale if turned else scale) for m, c in top.items()}
-    if any(abs(c) > _COEFFICIENT for c in whole.values()):
-        return None
-    return _Bound(whole, (offset if turned else -offset) / scale, turned, scale != 1)
-
-
-def _surface(bound: _Bound) -> Term | None:
-    """It, as what is added against what is taken away and the number."""
-    root = root_of_square(bound.of)
-    square = None if root is None else as_term(root)
-    if square is not None and (bare := number(bound.number)) is not None:
-        whole = pow_(square, const(2.0))
-        return sub(bare, whole) if bound.turned else sub(whole, bare)
-    added = as_term({m: c for m, c in bound.of.items() if c > 0})
-    taken = as_term({m: -c for m, c in bound.of.items() if c < 0} | ({(): bound.number} if bound.number else {}))
-    if added is None or taken is None:
-        return None
-    return sub(taken, added) if bound.turned else sub(added, taken)
 
 
 def plainer(surface: Term, box: Box) -> Term | None:
@@ -235,6 +161,8 @@ def _plain(item: Inequality, box: Box) -> list[Inequality]:
         without_root = _squared(found.top, item.strict, box) or _odd_root(found.top, item.strict)
         if without_root is not None:
             return [each for one in without_root for each in _plain(one, box)]
+    if found.whole and (around := angle_bounds(found.top, item.strict)) is not None:
+        return [each for u, strict in around for each in _plain(Inequality(u, strict), box)]
     if found.whole and (bounds := _below_square(found.top, item.strict)) is not None:
         return bounds
     if len(found.top) == 1:

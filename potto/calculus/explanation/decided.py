@@ -9,7 +9,8 @@ from collections.abc import Callable, Mapping
 
 from potto.calculus.algebra.ranges import Box, ValueRange, range_of
 from potto.calculus.explanation.alternatives import holds
-from potto.calculus.explanation.brackets import bracket as bracket_of
+from potto.calculus.explanation.bounds import bracket as bracket_of
+from potto.calculus.explanation.bounds import is_shorter
 from potto.calculus.explanation.brackets import conditions, fewer, plainer
 from potto.calculus.surfaces.branch_assignment import box_of, with_index
 from potto.core.terms import (
@@ -72,7 +73,8 @@ def _undecided(node: Term, known: Mapping[Term, Term], box: Box, simpler: Simple
         taken = side_taken(new, range_of(new.surface, box))
         if taken is not None:
             return taken
-        if len(new.coordinates) == 1 and (surface := plainer(new.surface, box)) is not None:
+        surface = plainer(new.surface, box) if len(new.coordinates) == 1 else None
+        if surface is not None and (surface.free < new.surface.free or not is_shorter(new.surface, surface)):
             new = branch((surface,), new.strict, new.then, new.orelse)
         held = conditions(new) if box else None
         if held is not None and set(plain := fewer(held, box)) != set(held):

@@ -8,6 +8,7 @@ what moves each. Functions that are parameters stay symbols (`symbols`).
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+from math import inf
 
 from msgspec.structs import replace
 
@@ -335,7 +336,7 @@ def _surfaces(node: Integral, tangents: Mapping[str, Term], words: Words) -> tup
             roots: list[str] = []
             try:
                 for root in pivots(node, factor, Roots.READ)[0].roots:
-                    roots.append(f"{root.variable} = {_root(root, words)}")
+                    roots.append(f"{root.variable} = {_root(root, node.variables, words)}")
             except NoClosedForm:
                 pass
             found[canonical] = SurfaceText(
@@ -346,13 +347,13 @@ def _surfaces(node: Integral, tangents: Mapping[str, Term], words: Words) -> tup
     return tuple(found.values())
 
 
-def _root(root: SurfaceRoot, words: Words) -> str:
+def _root(root: SurfaceRoot, variables: tuple[str, ...], words: Words) -> str:
     """A root where it exists; of many that recur, with the name of their index."""
     at = where_it_exists(root.at)
     index = root.index and apart(stem(root.index), (at.free | words.names | {root.variable}) - {root.index})
     if root.index and index:
         at = substitute(at, {root.index: var(index)})
-    text = words.notation.text(words.read(at))
+    text = words.notation.text(words.read(at, dict.fromkeys(variables, (-inf, inf))))
     return f"{text} for integers {index}" if index else text
 
 

@@ -8,17 +8,19 @@ from __future__ import annotations
 
 import math
 from fractions import Fraction
-from math import gcd
+from math import gcd, isqrt, lcm
 
 from msgspec import Struct
 
 from potto.calculus.algebra.ranges import range_of
+from potto.calculus.algebra.rational_form import as_term, normal
 from potto.calculus.explanation.brackets import (
     Inequality,
     conditions,
     constant,
 )
 from potto.core.polynomials import Exact, number, over, size_of
+from potto.core.printer import format_term
 from potto.core.terms import (
     Const,
     Prim,
@@ -117,6 +119,9 @@ def _collect(term: Term, exponent: Exact, into: Factors) -> None:
         case Prim(op="add", args=args) if exponent.denominator == 1 and (shared := gcd(*map(_whole, args))) > 1:
             into.coefficient *= Fraction(shared) ** int(exponent)
             into.times(add(*(_without(arg, shared) for arg in args)), exponent)
+        case Prim(op="add") if exponent.denominator == 2 and (whole := _over_square(term)) is not None:
+            into.coefficient *= whole[1] ** int(2 * exponent)
+            into.times(whole[0], exponent)
         case Prim(op="add") if exponent.denominator == 1 and (found := _cosine(term)) is not None:
             into.coefficient *= Fraction(found[1]) ** int(exponent)
             into.times(found[0], 2 * exponent)
@@ -128,6 +133,21 @@ def _collect(term: Term, exponent: Exact, into: Factors) -> None:
                 into.conditions += known
             else:
                 into.times(term, exponent)
+
+
+def _over_square(term: Term) -> tuple[Term, Fraction] | None:
+    """4 - x^2 and 1/2 for 1 - x^2/4, whose root is half of that of the first; None where that is no shorter."""
+    form = normal(term)
+    if form is None or not form.whole:
+        return None
+    numbers = [Fraction(c) for c in form.top.values()]
+    below = lcm(*(c.denominator for c in numbers))
+    root = isqrt(below)
+    if below == 1 or below > _LARGEST**2 or root * root != below:
+        return None
+    whole = as_term({m: c * below for m, c in form.top.items()})
+    shorter = whole is not None and len(format_term(whole)) + 1 < len(format_term(term))
+    return (whole, Fraction(1, root)) if whole is not None and shorter else None
 
 
 def _negative(term: Term) -> bool:

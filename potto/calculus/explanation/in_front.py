@@ -1,4 +1,7 @@
-"""What an integrand is a multiple of, in front of its integral. Owns `in_front`."""
+"""What an integrand or a summand is a multiple of, in front of its integral or its sum.
+
+Owns `in_front` and `hides_index`.
+"""
 
 from __future__ import annotations
 
@@ -6,15 +9,18 @@ from fractions import Fraction
 
 from potto.calculus.explanation.factors import Factors
 from potto.calculus.explanation.products import is_tangent, written
-from potto.core.terms import Const, Integral, Prim, Term, Var, postorder, with_integrand
+from potto.core.terms import Const, Integral, Prim, Sum, Term, Var, postorder, sum_, with_integrand
 
 _EVERYWHERE = ("add", "mul", "neg", "sin", "cos", "atan", "tanh")  # no exp, which can be inf
 
 
-def in_front(node: Integral, factors: Factors, tangents: frozenset[str]) -> Term:
-    """An integral with the number, the tangents and what has a value everywhere of the `factors` of its integrand
+def in_front(node: Integral | Sum, factors: Factors, tangents: frozenset[str]) -> Term:
+    """An integral or a sum with the number, the tangents and what has a value everywhere of the `factors` of its body
     before it: what has none somewhere stays, since brackets guard it there."""
-    still = {base: n for base, n in factors.powers.items() if base.free.isdisjoint(node.variables)}
+    names = node.variables if isinstance(node, Integral) else (node.variable,)
+    if isinstance(node, Sum) and hides_index(node):
+        return node
+    still = {base: n for base, n in factors.powers.items() if base.free.isdisjoint(names)}
     fixed = {
         base: n
         for base, n in still.items()
@@ -24,7 +30,13 @@ def in_front(node: Integral, factors: Factors, tangents: frozenset[str]) -> Term
         return node
     rest = {base: n for base, n in factors.powers.items() if base not in fixed}
     inner = written(Factors(Fraction(1), rest, factors.exponents, factors.conditions), tangents)
-    return written(Factors(factors.coefficient, {with_integrand(node, inner): 1, **fixed}, [], []), tangents)
+    whole = with_integrand(node, inner) if isinstance(node, Integral) else sum_(node.variable, node.lo, node.hi, inner)
+    return written(Factors(factors.coefficient, {whole: 1, **fixed}, [], []), tangents)
+
+
+def hides_index(node: Sum) -> bool:
+    """Whether an index may stand within a name, as in `people[i].age`, the name of a field."""
+    return any("[" in name for name in node.body.free)
 
 
 def _has_values(term: Term) -> bool:

@@ -11,10 +11,11 @@ from msgspec import Struct
 
 from potto.calculus.explanation.decimals import in_decimals, over_whole_numbers
 from potto.calculus.explanation.fields import fields_of
+from potto.calculus.explanation.products import in_order
 from potto.core.numerals import Numbers
 from potto.core.printer import format_equation, format_term
 from potto.core.simplify import simplify
-from potto.core.terms import Deriv, Global, Term, global_
+from potto.core.terms import Deriv, Global, Term, global_, transform
 from potto.elaborate import core_term
 from potto.modules import definition
 from potto.query import Database
@@ -38,7 +39,9 @@ class Notation(Struct, frozen=True):
 
     def equation(self, surface: Term, variables: Iterable[str] = ()) -> str:
         """Where a surface is, as people write it: `x = t` for t - x, where x is one of the variables."""
-        return format_equation(simplify(in_decimals(surface)), variables, self.numbers)
+        plain = in_decimals(simplify(in_decimals(surface)))
+        ordered = transform(plain, lambda _, new: in_order(new, frozenset()))
+        return format_equation(ordered, variables, self.numbers)
 
 
 def written_notation(db: Database, file: str, name: str) -> Notation:

@@ -1,7 +1,7 @@
 """How a product is written to be read.
 
-Owns `written`, `with_one_root`, `added`, `is_negative` and `is_tangent`. Signs and sizes are told by the conditions
-beside them, where these do.
+Owns `written`, `with_one_root`, `in_order`, `led_by`, `added`, `is_negative` and `is_tangent`. Signs and sizes are told
+by the conditions beside them, where these do.
 """
 
 from __future__ import annotations
@@ -10,10 +10,11 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from fractions import Fraction
 
+from potto.calculus.algebra.rational_form import as_term, normal
+from potto.calculus.explanation.bounds import bracket
 from potto.calculus.explanation.brackets import (
     NEVER,
     Inequality,
-    bracket,
     conditions,
     fewer,
     implies,
@@ -35,6 +36,7 @@ from potto.core.terms import (
     Integral,
     Prim,
     Proj,
+    Sum,
     Term,
     Var,
     add,
@@ -48,7 +50,7 @@ from potto.core.terms import (
 )
 
 _HALF = Fraction(1, 2)
-_PLAIN, _TANGENT, _INTEGRAL, _DELTA = range(4)
+_PLAIN, _TANGENT, _SUM, _INTEGRAL, _DELTA = range(5)
 _FEW = 6  # digits of a number that a person has written
 _LARGEST_DIVISOR = 1000
 
@@ -68,11 +70,25 @@ def _tidied(known: Factors) -> Factors:
                 found.powers[base] = exponent - 1
         if is_parity(base):
             found.times(base, exponent % 2 - exponent)
+        if exponent == _HALF:
+            _rooted(found, base)
         if (inner := _signed_by(base)) is not None:
             _signed(found, base, inner)
         if isinstance(base, Prim) and base.op == "abs" and exponent.denominator == 1:
             _sized(found, base, int(exponent))
     return found
+
+
+def _rooted(found: Factors, base: Term) -> None:
+    """1/sqrt(4*pi*t) for sqrt(4*pi*t)/(4*pi*t), whose factors stand below the line one by one."""
+    inner = factored(base)
+    if base in inner.powers or inner.exponents or inner.conditions or not inner.powers:
+        return
+    if all(found.powers.get(factor, 0) <= -n < 0 for factor, n in inner.powers.items()):
+        found.coefficient *= inner.coefficient
+        for factor, n in inner.powers.items():
+            found.times(factor, n)
+        found.times(base, -1)
 
 
 def _where(known: Sequence[Inequality], base: Term) -> Term | None:
@@ -214,7 +230,46 @@ def with_one_root(node: Term) -> Term:
     if len(roots) < 2:
         return node
     others = [arg for arg in node.args if arg not in roots]
-    return mul(*others, prim("sqrt", mul(*(root.args[0] for root in roots))))
+    inside = mul(*(root.args[0] for root in roots))
+    found = normal(inside)
+    plain = as_term(found.top) if found is not None and found.whole else None
+    shorter = plain is not None and len(format_term(plain)) < len(format_term(inside))
+    return mul(*others, prim("sqrt", plain if plain is not None and shorter else inside))
+
+
+def in_order(node: Term, tangents: frozenset[str]) -> Term:
+    """A product with the names among its factors in order: c*t for t*c."""
+    if not isinstance(node, Prim) or node.op != "mul":
+        return node
+    places = [n for n, arg in enumerate(node.args) if _is_power_of_name(arg, tangents)]
+    names = sorted((node.args[n] for n in places), key=lambda arg: _order(_base(arg)))
+    ordered = dict(zip(places, names, strict=True))
+    args = [ordered.get(n, arg) for n, arg in enumerate(node.args)]
+    return node if tuple(args) == node.args else mul(*args)
+
+
+def _is_power_of_name(term: Term, tangents: frozenset[str]) -> bool:
+    base = _base(term)
+    named = isinstance(base, Var) or (isinstance(base, Const) and base.name is not None)
+    return named and _place(base, tangents) == _PLAIN
+
+
+def _base(term: Term) -> Term:
+    match term:
+        case Prim(op="pow", args=(base, Const())):
+            return base
+        case _:
+            return term
+
+
+def led_by(node: Term, inside: frozenset[str]) -> Term:
+    """An even power of a difference with what varies inside of an integral first: (x - a)^2 for (a - x)^2."""
+    match node:
+        case Prim(op="pow", args=(Prim(op="add", args=args), Const(value=n) as exponent)) if n % 2 == 0:
+            led = [is_negative(part) for part in args if not part.free.isdisjoint(inside)]
+            return pow_(added([neg(part) for part in args]), exponent) if led and all(led) else node
+        case _:
+            return node
 
 
 def _raised(base: Term, exponent: Exact) -> Term:
@@ -222,7 +277,7 @@ def _raised(base: Term, exponent: Exact) -> Term:
         return base
     if exponent == _HALF:
         return prim("sqrt", base)
-    if exponent.denominator == 2:
+    if exponent.denominator == 2 and not (isinstance(base, Prim) and base.op == "add"):  # (x^2 + y^2)^(3/2)
         return mul(*([_raised(base, exponent - _HALF)] if exponent > _HALF else []), prim("sqrt", base))
     return pow_(base, number(exponent) or const(float(exponent)))
 
@@ -231,6 +286,8 @@ def _place(base: Term, tangents: frozenset[str]) -> int:
     if isinstance(base, Delta) or (isinstance(base, App) and isinstance(base.function, Var)
                                    and base.function.name.startswith("delta'")):  # fmt: skip
         return _DELTA
+    if isinstance(base, Sum):
+        return _SUM
     if isinstance(base, Integral) or _is_of_brackets(base):
         return _INTEGRAL
     moves = is_tangent(base, tangents) or (isinstance(base, Prim) and base.op == "add" and base.free & tangents)

@@ -10,24 +10,27 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from fractions import Fraction
-from math import gcd, inf, isfinite, lcm
+from math import inf, isfinite
 
 from msgspec import Struct
 
 from potto.calculus.algebra.ranges import Box, range_of
-from potto.calculus.algebra.rational_form import Rational, equal, normal
+from potto.calculus.algebra.rational_form import Rational, normal
+from potto.calculus.explanation.alike import alike, content
 from potto.calculus.explanation.alternatives import in_one, sums_of_choices
 from potto.calculus.explanation.angles import at_angle, length
-from potto.calculus.explanation.brackets import Inequality, between, conditions, fewer
-from potto.calculus.explanation.brackets import bracket as bracket_of
+from potto.calculus.explanation.bounds import between
+from potto.calculus.explanation.bounds import bracket as bracket_of
+from potto.calculus.explanation.brackets import Inequality, conditions, fewer
 from potto.calculus.explanation.common_factors import collected, taken_out
 from potto.calculus.explanation.decided import decided, side_taken
 from potto.calculus.explanation.decimals import over_whole_numbers, root_of_number
 from potto.calculus.explanation.factors import Factors, factored
-from potto.calculus.explanation.in_front import in_front
-from potto.calculus.explanation.products import added, is_negative, is_tangent, with_one_root, written
+from potto.calculus.explanation.in_front import hides_index, in_front
+from potto.calculus.explanation.named_sums import put_back, with_sums_named
+from potto.calculus.explanation.products import added, in_order, is_negative, led_by, with_one_root, written
 from potto.calculus.explanation.signs import of_two, sign_of_product, size_of_product, sums_of_signs
-from potto.calculus.explanation.squares import root_of_square
+from potto.calculus.explanation.squares import root_of_square, squares_in
 from potto.core.numerals import Numbers
 from potto.core.polynomials import Monomial, Polynomial, shared_by, without
 from potto.core.printer import LEFT_OUT, format_term
@@ -58,11 +61,9 @@ from potto.core.terms import (
     postorder,
     pow_,
     prim,
-    rebuild,
     sub,
     substitute,
     transform,
-    var,
 )
 
 _ARITHMETIC = ("add", "neg", "mul", "div", "pow", "sqrt", "exp")
@@ -70,7 +71,6 @@ _LONG = 100_000  # characters of a formula of which nobody will read what can be
 _MANY = 60  # nodes of what is expanded
 _SUMMANDS = 24
 _TANGENT = 4  # how much longer a formula seems for each tangent that it names
-_SUM = "sum'"  # the name of a sum while it is not taken apart: one that nobody can write
 
 
 class ReadableParts(Struct):
@@ -95,7 +95,7 @@ def readable(
     integers = frozenset(node.variable for node in postorder(term) if isinstance(node, Sum | Array | Fold))
     work = _Work(tangents, _bound(term) | frozenset(box or ()), integers, progress or ReadableParts())
     found = decided(transform(term, lambda _, new: work.node(new)), box or {}, work.node)
-    return transform(found, lambda _, new: with_one_root(new))
+    return transform(found, lambda _, new: led_by(in_order(with_one_root(new), tangents), work.inside | integers))
 
 
 def formula(term: Term) -> str:
@@ -153,6 +153,8 @@ class _Work:
                 return at_angle(node, self.integers)
             case Sum(lo=Const(value=lo), hi=Const(value=hi)) if hi <= lo:
                 return substitute(node.body, {node.variable: node.lo}) if lo == hi else ZERO
+            case Sum():
+                return self._of_few(node) or in_front(node, self._factored(node.body), self.tangents)
             case If():
                 return in_one(node, self.tangents, self.inside, self._cost)
             case Integral():
@@ -184,6 +186,18 @@ class _Work:
             return if_(choice.condition, then, orelse)
         return self.node(branch(choice.coordinates, choice.strict, then, orelse))
 
+    def _of_few(self, node: Sum) -> Term | None:
+        """A sum of two, one by one, if that is shorter: x and 1 - x for the values at 0 and 1."""
+        match node:
+            case Sum(lo=Const(value=lo), hi=Const(value=hi)) if hi == lo + 1 and not hides_index(node):
+                if any(isinstance(part, Integral) for part in postorder(node.body)):
+                    return None
+                both = add(*(substitute(node.body, {node.variable: end}) for end in (node.lo, node.hi)))
+                whole = transform(both, lambda _, new: self.node(new))
+                return whole if self._cost(whole) < self._cost(node) else None
+            case _:
+                return None
+
     def _over_few(self, node: Integral) -> Term:
         """An integral over the variables that something in it depends on, times the lengths of the others."""
         if node.body is ZERO:
@@ -211,11 +225,11 @@ class _Work:
             case _:
                 forms = [self._with_sums_as_products(node), written(factored(node), self.tangents)]
         if sum(1 for _ in postorder(node)) <= _MANY:
-            whole, sums = self._with_sums_named(node)
+            whole, sums = with_sums_named(node, self.tangents)
             for form, named in ((node, []), (whole, sums)) if sums else ((node, sums),):
                 found = normal(form)
                 if found is not None and len(found.top) <= _SUMMANDS:
-                    expanded = [self._put_back(each, named) for each in self._expanded(found)]
+                    expanded = [put_back(each, named, self.tangents, self._sum) for each in self._expanded(found)]
                     below = self._roots_below(node)
                     forms += [each for each in expanded if self._roots_below(each) <= below]
         forms = list(dict.fromkeys(forms))
@@ -284,33 +298,6 @@ class _Work:
         led = [p for p in parts if not p.free.isdisjoint(self.inside)] or list(parts)
         return added([neg(p) for p in parts]) if all(map(is_negative, led)) else whole
 
-    def _with_sums_named(self, node: Term) -> tuple[Term, list[tuple[str, Term]]]:
-        """The node with a name for each sum that is a factor in it: (x - m)^2 is not taken apart then."""
-        names: list[tuple[str, Term]] = []
-
-        def named(part: Term) -> Term:
-            if not isinstance(part, Prim) or part.op != "add" or not part.free.isdisjoint(self.tangents):
-                return part
-            for name, known in names:
-                if equal(part, known):
-                    return var(name)
-                if equal(part, neg(known)):
-                    return neg(var(name))
-            names.append((f"{_SUM}{len(names)}", part))
-            return var(names[-1][0])
-
-        def change(old: Term, new: Term) -> Term:
-            if not isinstance(old, Prim) or old.op not in ("mul", "div", "pow") or not isinstance(new, Prim):
-                return new
-            return rebuild(new, tuple(map(named, new.args)))
-
-        return transform(node, change, below=lambda n: children(n) if isinstance(n, Prim) else ()), names
-
-    def _put_back(self, term: Term, named: list[tuple[str, Term]]) -> Term:
-        for name, meant in reversed(named):
-            term = substitute(term, {name: meant})
-        return term
-
     def _cost(self, form: Term) -> float:
         text = format_term(form)
         return inf if LEFT_OUT in text else len(text) + _TANGENT * sum(text.count(name) for name in self.tangents)
@@ -341,45 +328,40 @@ class _Work:
             return [ZERO]
         shared = shared_by(list(found.top))
         rest = {without(m, shared): c for m, c in found.top.items()}
-        scale = _content(rest)
+        scale = content(rest)
         rest = {m: Fraction(c / scale) for m, c in rest.items()}
         under = ((self._sum(found.below), 1),) if found.below != {(): 1} else ()
-        inner = self._around_tangents(rest)
+        is_angle = PI in shared  # (2*pi*k + pi/6)^2 is read as it is
+        inner = self._around_tangents(rest, self._plain_sum if is_angle else self._sum)
         common = tuple(shared.items())
         whole = self._product(scale, (common, 1), *([(((inner, 1),), 1)]), (under, -1))
         apart = [self._product(c * scale, (m, 1), (common, 1), (under, -1)) for m, c in rest.items()]
-        root = None if PI in shared else root_of_square(rest)  # (2*pi*k + pi/6)^2 is read as it is
+        if not (common or under) and scale != 1 and squares_in(rest)[0]:
+            apart = [self._sum({m: c * scale for m, c in rest.items()})]
+        root = None if is_angle else root_of_square(rest)
         if root is not None:
             return [self._product(scale, (common, 1), (((self._sum(root), 2),), 1), (under, -1)), whole, added(apart)]
         return [whole, added(apart)]
 
-    def _around_tangents(self, form: Polynomial) -> Term:
-        """A polynomial as a sum over its tangents, each with all that it is multiplied by."""
-        groups: dict[Monomial, dict[Monomial, Fraction]] = {}
-        for monomial, c in form.items():
-            moving = tuple((a, n) for a, n in monomial if is_tangent(a, self.tangents))
-            groups.setdefault(moving, {})[tuple(p for p in monomial if p not in moving)] = Fraction(c)
+    def _around_tangents(self, form: Polynomial, summed: Callable[[Polynomial], Term]) -> Term:
+        """A polynomial as a sum over its tangents, each with all that it is multiplied by, or several of them that are
+        multiplied by the same."""
         parts: list[Term] = []
-        for moving, coefficient in groups.items():
-            shared = shared_by(list(coefficient))
-            rest = {without(m, shared): c for m, c in coefficient.items()}
-            scale = _content(rest)
-            inner = self._sum({m: c / scale for m, c in rest.items()})
-            parts.append(self._product(scale, (tuple(shared.items()), 1), (((inner, 1),), 1), (moving, 1)))
+        for group in alike(form, self.tangents):
+            scale = content(group.moves)
+            along = self._plain_sum({m: c / scale for m, c in group.moves.items()})
+            factors = (group.shared, 1), (((summed(group.rest), 1),), 1), (((along, 1),), 1)
+            parts.append(self._product(scale, *factors))
         return added(parts)
 
     def _sum(self, form: Polynomial) -> Term:
+        squares, rest = squares_in(form)
+        parts = [self._product(scale, (((self._plain_sum(root), 2),), 1)) for scale, root in squares]
+        return added([*parts, self._plain_sum(rest)] if squares else [self._plain_sum(rest)])
+
+    def _plain_sum(self, form: Polynomial) -> Term:
         return added([self._product(Fraction(c), (m, 1)) for m, c in form.items()])
 
 
 def _is_endless(bound: Term) -> bool:
     return isinstance(bound, Const) and not isfinite(bound.value)
-
-
-def _content(form: Polynomial) -> Fraction:
-    """What the coefficients of a polynomial share, and the sign of all if they are one."""
-    top = gcd(*(c.numerator for c in form.values()))
-    below = lcm(*(c.denominator for c in form.values()))
-    if below > 1000 or top > 1000:
-        return Fraction(1)
-    return Fraction(-top if all(c < 0 for c in form.values()) else top, below)

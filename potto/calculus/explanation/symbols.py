@@ -112,9 +112,10 @@ class Words(Struct, frozen=True):
         """The same of what stands under an integral, `inside` of its variables too: its brackets guard it there."""
         return self._written(self._readable(term, inside, box))
 
-    def read(self, term: Term) -> Term:
-        """A term in which nothing moves, simplified; parts of records by their names."""
-        return readable(simplify(self.notation.fields(term)), frozenset())
+    def read(self, term: Term, box: Box | None = None) -> Term:
+        """A term in which nothing moves, simplified; parts of records by their names. box: the ranges of what varies
+        inside of an integral."""
+        return readable(simplify(self.notation.fields(term)), frozenset(), box)
 
     def _readable(self, term: Term, inside: tuple[str, ...], box: Box | None) -> Term:
         plain = symbols(without_guards(simplify(transform(term, _by_formula))), self.functions)
