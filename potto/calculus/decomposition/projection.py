@@ -28,8 +28,9 @@ from potto.calculus.solving.solve import Sections
 from potto.core.simplify import simplify
 from potto.core.terms import Branch, Prim, Term, postorder, sub, substitute, var
 
-MOST_PAIRS = 12  # surfaces whose crossings are worked out, if they are kinks: those of crossings come to hundreds
-MOST_JUMPS = 48  # the same, if they are jumps
+# Surfaces whose crossings are worked out, if they are kinks: those of crossings come to hundreds; the same, if they are
+# jumps, or if it is known where in space they come from, since few of these meet.
+MOST_PAIRS, MOST_JUMPS = 12, 48
 MOST_SYSTEMS = 600  # whose places are projected further out: pairs of surfaces, of which 34 have so many
 
 
@@ -136,7 +137,7 @@ def crossing(cuts: Sequence[Cut], variable: str, further: frozenset[str]) -> tup
     """The cuts whose crossings are worked out, and whether those are all that may cross."""
     meeting = [c for c in cuts if c.roots or c.families or c.roots is None]
     meeting = [c for c in meeting if not scattered(along(c), variable, further)]
-    chosen = [c for n, c in enumerate(meeting) if n < (MOST_JUMPS if c.decides else MOST_PAIRS)]
+    chosen = [c for n, c in enumerate(meeting) if n < (MOST_JUMPS if c.decides or c.strata else MOST_PAIRS)]
     return chosen, chosen == meeting
 
 
