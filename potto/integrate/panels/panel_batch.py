@@ -7,6 +7,7 @@ comes from the same procedure one level down (`Iterated`). Refinement is not its
 from __future__ import annotations
 
 from contextlib import nullcontext
+from functools import cached_property
 
 import numpy as np
 from msgspec import Struct
@@ -42,6 +43,10 @@ UNSURE = 1e-9  # how far off cuts may be, in parts of a segment, until it matter
 HIDDEN = 2.0**-40
 # Up to which part of an integrand its rounding within is no more than what is counted for its variable.
 CLEAR = 16 * EPS
+# By which power of the distance from a turning point integrands, and their derivatives, grow at most, nearly; how close
+# to it they are looked at, in the coordinate that a segment is run through by, and how many times as large as in the
+# middle those are there that grow.
+POWER, OF_DERIVATIVES, CLOSE, STEEP = 1.0, 1.5, 1e-3, 30.0
 BESIDE = 1e-9  # how far from the ends of a segment, in parts of it, it is looked at just inside
 
 
@@ -135,8 +140,10 @@ class PanelBatch(Struct, dict=True):
             slope = h @ rule.derivative
             h = np.where(np.isfinite(slope) & (np.abs(part) < 0.1), h - part * slope, h)
         self.estimate(p, seg, h, rule, shake(p, seg, x, weight, off is not None))
-        if self.k and seg.kind.any():
-            p.floor = p.floor + (np.abs(h) * substitution.trembling(seg, x)) @ rule.weights
+        if seg.kind.any():
+            power = OF_DERIVATIVES if self.k else POWER
+            blur = None if self.radicands is None else self.radicands[:, p.segment]
+            p.floor = p.floor + (np.abs(h) * substitution.trembling(seg, x, power, blur)) @ rule.weights
         if inner is not None:
             p.floor = p.floor + np.abs(inner) @ rule.weights
         return p
@@ -306,6 +313,28 @@ class PanelBatch(Struct, dict=True):
                 self.inner, self.tracked = self.inner.tracking(), True
         return Ends(f[:, :count], f[:, count:], e[:, :count], e[:, count:], part)
 
+    @cached_property
+    def radicands(self) -> Array | None:
+        """How far from turning points, at the left and right ends of segments, the integrand's rounding puts them:
+        (2, S). As seen close by, where values grow like the inverse of a square root of the distance; else 0."""
+        seg = self.seg
+        if not self.last or not seg.turning.any():
+            return None
+        found = np.zeros((2, seg.a.size))
+        ends = (substitution.LEFT, CLOSE, seg.left), (substitution.RIGHT, 1 - CLOSE, seg.right)
+        for row, (kind, u, turn) in enumerate(ends):
+            index = np.flatnonzero(np.isin(seg.kind, (kind, substitution.BOTH)))
+            if index.size:
+                place = np.full((index.size, 1), u)
+                near, off = self.seen(index, place)
+                inside, _ = self.seen(index, np.full((index.size, 1), 0.5))
+                part = np.where(near > STEEP * inside, part_of(near, off), 0.0).max(axis=0)
+                x, _, _ = substitution.points(seg.pick(index), place)
+                found[row, index] = (
+                    2 * np.where(part > CLEAR, np.minimum(part, 1.0), 0.0) * np.abs(x[:, 0] - turn[index])
+                )
+        return found
+
     def seen_within(self, at_ends: Array) -> Array:
         """Which part of F its rounding is on segments, (m, S): that at their ends, which are often whole numbers, where
         sums are exact, unless it is more within. Of many segments some are looked at, and all if these say so."""
@@ -322,17 +351,22 @@ class PanelBatch(Struct, dict=True):
         return part
 
     def share_within(self, index: Ints) -> Array:
-        """Which part of F its rounding is within segments, 0 where there is none, at places together, which are not
-        counted as evaluations: (m, I)."""
-        x, _, _ = substitution.points(self.seg.pick(index), np.tile(WITHIN, (index.size, 1)))
-        rows = np.repeat(index, WITHIN.size)
+        """Which part of F its rounding is within segments: (m, I)."""
+        return part_of(*self.seen(index, np.tile(WITHIN, (index.size, 1))))
+
+    def seen(self, index: Ints, u: Array) -> tuple[Array, Array]:
+        """The size of F, and its rounding, at places u (I, n) of segments together, which are not counted as
+        evaluations: (m, I) each."""
+        x, _, _ = substitution.points(self.seg.pick(index), u)
+        rows = np.repeat(index, u.shape[1])
         sides = take(self.sides, rows)
         here = self.standing(x.ravel(), self.seg.owner[rows])
         numbers, errors = dense(
             self.parent.body(here, sides, self.machine.with_directions(0).tracking()), 0, rows.shape
         )
         off = np.zeros(numbers.shape) if errors is None else np.where(np.isfinite(errors), errors, 0.0)
-        return part_of(*(np.abs(row[:, 0]).reshape(-1, *x.shape).sum(axis=-1) for row in (numbers, off)))
+        size, lost = (np.abs(row[:, 0]).reshape(-1, *x.shape).sum(axis=-1) for row in (numbers, off))
+        return size, lost
 
     def still_at(self, x: Array, owner: Ints, sides: dict[int, Mask]) -> tuple[Array, Array]:
         """F at places of members, without tangents, and its rounding, where F is finite: (m, N) each."""

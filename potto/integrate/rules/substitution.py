@@ -96,20 +96,22 @@ def off_the_ends(seg: Segments, x: Array) -> Array:
     return np.where(x <= seg.a[:, None], low, np.where(x >= seg.b[:, None], high, x))
 
 
-def trembling(seg: Segments, x: Array) -> Array:
+def trembling(seg: Segments, x: Array, power: float, blur: Array | None) -> Array:
     """How much values next to a turning point change as points are rounded, relatively: (P, n), 0 on other segments.
 
-    Values like the power -3/2 of the distance, which second derivatives have there, and half a unit of the last place,
-    or as far as the point itself may be off: the integrand, too, knows it no better.
+    Values like this negative power of the distance, and half a unit of the last place, or as far as the point itself
+    may be off: the integrand, too, knows it no better. blur: (2, P) how far off the integrand
+    sees turning points, if that is known.
     """
     least = 0.5 * EPS * np.abs(x)
     found = np.zeros(x.shape)
-    for kinds, turn, end, off in (
-        ((LEFT, BOTH), seg.left, seg.a, seg.ea), ((RIGHT, BOTH), seg.right, seg.b, seg.eb)
+    seen = (0.0, 0.0) if blur is None else (blur[0][:, None], blur[1][:, None])
+    for kinds, turn, end, off, own in (
+        ((LEFT, BOTH), seg.left, seg.a, seg.ea, seen[0]), ((RIGHT, BOTH), seg.right, seg.b, seg.eb, seen[1])
     ):  # fmt: skip
-        rounded = np.fmax(least, np.where((turn == end) & np.isfinite(off), TYPICAL * off, 0.0)[:, None])
+        rounded = np.fmax(least, np.where((turn == end) & np.isfinite(off), TYPICAL * off, 0.0)[:, None]) + own
         near = np.where(np.isin(seg.kind, kinds)[:, None], np.abs(x - turn[:, None]), np.inf)
-        found = np.maximum(found, 1.5 * rounded / np.maximum(near, 2 * least))
+        found = np.maximum(found, power * rounded / np.maximum(near, 2 * least))
     return np.minimum(found, 1.0)
 
 
