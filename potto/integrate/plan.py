@@ -47,6 +47,7 @@ from potto.core.terms import (
     var,
     with_integrand,
 )  # fmt: skip
+from potto.integrate.decomposition.layers import exponents_of
 from potto.integrate.decomposition.vanishing import Vanishing
 from potto.integrate.fixed.straight import StraightIntegral, straight
 from potto.integrate.levels import Group, LevelPlan
@@ -140,6 +141,14 @@ class Plan(Struct, frozen=True, dict=True):
         if self.inlined is None or last.peaks:
             return None
         return straight(integral((last.variable,), self.term.bounds[-1:], self.term.body), self.inlined, (last,))
+
+    @cached_property
+    def exponents(self) -> tuple[Lam | None, ...]:
+        """By variable what says where exponentials in the integrand have layers."""
+        if self.over is not None:
+            return (None,) * len(self.levels)
+        names = frozenset(self.body.params)
+        return tuple(exponents_of(self.mass, level.variable, names) for level in self.levels)
 
     @cached_property
     def box(self) -> Box | None:

@@ -25,10 +25,20 @@ def _power_partials(base: Term, exponent: Term) -> Terms:
     return by_base, by_exponent
 
 
+PLAIN_POWER = 64.0  # up to this power a number falls, from 1 on, no faster than polynomials can follow
+
+
 def _power_edges(base: Term, exponent: Term) -> Terms:
     """At base 0, unless the exponent is a natural number."""
     whole = isinstance(exponent, Const) and exponent.value >= 0 and exponent.value.is_integer()
     return () if whole else (base,)
+
+
+def _power_exponents(base: Term, exponent: Term) -> Terms:
+    """Of such powers alone that have a layer where the base is 1."""
+    if isinstance(exponent, Const) and abs(exponent.value) <= PLAIN_POWER:
+        return ()
+    return (mul(exponent, prim("log", prim("abs", base))),)
 
 
 add = register(
@@ -111,6 +121,7 @@ pow_entry = register(
         partials=_power_partials,
         domain=((1e-3, 1e3), (-20.0, 20.0)),
         edges=_power_edges,
+        exponents=_power_exponents,
         steep=lambda base, exponent: not isinstance(exponent, Const) or 0 < exponent.value < 1,
         example="pow(2, 10)",
     )

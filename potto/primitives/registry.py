@@ -110,6 +110,7 @@ class Primitive(Struct, frozen=True):
     extremes: for those of them that are the greatest or the least of terms, what they are by max and min.
     edges: terms over the arguments that are 0 at the edge of the domain and where the builtin or its derivative is
         singular (sqrt: x; log: x; asin: 1 - x, 1 + x).
+    exponents: terms over the arguments by whose differences the logarithm of it, or of a part of it, changes (exp: x).
     steep: by the arguments, whether a slope may be infinite, or nan, where the builtin is finite (sqrt: at 0).
     broken: whether it may have a pole, or jump by itself.
     centered: whether it changes mostly where its argument is near 0.
@@ -161,6 +162,7 @@ class Primitive(Struct, frozen=True):
     cases: Callable[..., tuple[Term, Term, Term]] | None = None
     extremes: Callable[..., Term] | None = None
     edges: Callable[..., Terms] = field(default=_none)
+    exponents: Callable[..., Terms] = field(default=_none)
     steep: Callable[..., bool] = field(default=_never)
     broken: bool = False
     centered: bool = False

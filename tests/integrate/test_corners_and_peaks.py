@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable
+from typing import Literal
 
 import mpmath as mp
 import pytest
@@ -44,6 +45,33 @@ def test_what_is_narrow_at_an_end_of_an_outer_variable(ranges: str, body: str, e
     f = potto.compile(f"def f(t) integral ({ranges}) {body} d({names})").f
     answer = f(0.3)
     assert abs(answer.value - exact(0.3)) <= answer.error <= 1e-9
+
+
+E1 = math.e - 1
+# Programs with layers beside cuts, and such as are 0 at the end itself, or small: what they are, and their slopes.
+LAYERS = [
+    ("([0, 1], [0, 1]) [x > t]*(1 + 1e4*exp(-1e4*(x - t)))*exp(y) d(x, y)", lambda t: (2 - t)*E1, -E1),
+    ("([0, 1], [0, 1]) [x > t + y/8]*(1 + 1e4*exp(-1e4*(x - t - y/8)))*exp(y) d(x, y)",
+     lambda t: (2 - t)*E1 - 1/8, -E1),
+    ("([0, 1], [0, 1], [0, 1]) [y > t*x]*(1 + 1e4*exp(-1e4*(y - t*x)))*exp(z) d(x, y, z)",
+     lambda t: (2 - t/2)*E1, -E1/2),
+    ("([0, t], [0, 1]) (1 + 1e6*x*exp(-1e4*x))*exp(y) d(x, y)", lambda t: (t + 0.01)*E1, E1),
+    ("[0, 1] (t + 0.5*exp(-5000*x)) d(x)", lambda t: t + 1e-4, 1),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("backend", ["numpy", "native"])
+@pytest.mark.parametrize(("body", "exact", "slope"), LAYERS, ids=[row[0] for row in LAYERS])
+def test_a_layer_beside_a_cut_or_an_end(
+    body: str, exact: Callable[[float], float], slope: float, backend: Literal["numpy", "native"]
+) -> None:
+    """No node of a range sees it, nor need its end: all but the third and fourth were missed without a word."""
+    f = potto.compile(f"def f(t) integral {body}").f
+    with potto.settings(backend=backend):
+        for t, answer in ((0.3, potto.deriv(f)((0.3, 1.0))), (0.25, f([0.25, 0.35])[0])):
+            assert abs(answer.value - exact(t)) <= answer.error <= 1e-8
+            if answer.tangent is not None:
+                assert abs(answer.tangent - slope) <= answer.tangent_error <= 1e-7
 
 
 PEAKS = [

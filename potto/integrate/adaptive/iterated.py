@@ -7,7 +7,7 @@ leaves out the segments on which the integrand vanishes, and hands the rest to `
 from __future__ import annotations
 
 import numpy as np
-from msgspec import Struct
+from msgspec import Struct, field
 from msgspec.structs import replace
 
 from potto.core.terms import Term
@@ -20,6 +20,7 @@ from potto.integrate.decomposition.covered import uncovered
 from potto.integrate.decomposition.critical_places import critical_rows
 from potto.integrate.decomposition.cuts import Cuts, at_rest, finite_speeds, frame_rows, on_bounds, segments, standing
 from potto.integrate.decomposition.effective_range import Ranges, pulled_in, reaches
+from potto.integrate.decomposition.layers import layer_rows
 from potto.integrate.decomposition.meetings import Row, as_array
 from potto.integrate.decomposition.sections import searched_rows
 from potto.integrate.decomposition.shells import shells
@@ -61,7 +62,7 @@ class Iteration(Struct):
 
     still: surfaces that don't move here, since someone else counts what their motion does. tracked: whether the
     integrand brings its rounding along at every node. face: what is integrated instead of the integrand, if anything.
-    peaked: whether the integrand has peaks at the ends of ranges.
+    peaked: the variables at ends of whose segments the integrand has peaks.
     """
 
     plan: Plan
@@ -73,7 +74,7 @@ class Iteration(Struct):
     face: Face | None = None
     first: int = 0
     further_in: float = 1.0
-    peaked: bool = False
+    peaked: set[int] = field(default_factory=set)
 
     @property
     def degrees(self) -> tuple[int | None, ...]:
@@ -90,19 +91,20 @@ class Iteration(Struct):
     def whole(self, env: dict[str, Value], batch: int) -> Sums:
         """The integrals of a batch over all variables, with what they could come to at most counted as added up."""
         self.extent = Extent(len(self.plan.levels), self.machine.directions, batch)
-        self.peaked = peaks_at_ends(self.plan, self.machine, env, batch)
-        sums = self.run(0, env, batch, {}, self.machine)
+        self.peaked = set()
+        sums = self.run(0, env, batch, {}, self.machine, None, None, True)
         self.extent.count(sums)
         return sums
 
     def run(
         self, number: int, env: dict[str, Value], batch: int, sides: dict[int, Mask], machine: Evaluator,
-        root: Ints | None = None, slack: Array | None = None,
+        root: Ints | None = None, slack: Array | None = None, looks: bool = False,
     ) -> Sums:  # fmt: skip
         """Integrate over variable `number` and those further in, for a batch of environments.
 
         `root` says, of a batch of nodes, which member of the outermost batch each belongs to; None if there is one.
-        `slack` says how many times the error may be larger of nodes that have less weight than others.
+        `slack` says how many times the error may be larger of nodes that have less weight than others. `looks`: whether
+        peaks are looked for at ends of segments, as they are once, at the first nodes of variables further out.
         """
         level = self.plan.levels[number]
         if self.plan.over is not None and number + 1 == len(self.plan.levels):
@@ -121,8 +123,10 @@ class Iteration(Struct):
         if keep is not None:
             here, sides = seg.pick(keep), take(sides, keep)
         moving = cuts.moving and machine.directions > 0
+        if looks and number not in self.peaked and peaks_at_ends(self, number, env, here, sides, machine):
+            self.peaked.add(number)
         work = PanelBatch(self, number, level, env, here, sides, machine, moving, batch, root, slack,
-                          cuts.conflict, cuts.paired, cuts.rested)  # fmt: skip
+                          cuts.conflict, cuts.paired, cuts.rested, looks)  # fmt: skip
         sums = integrated(work)
         if number == self.first and (lost_far_out := sums.undefined(batch)).size:
             self.nearer(work, sums, lost_far_out)
@@ -231,6 +235,12 @@ class Iteration(Struct):
         corners = corner_rows(level, env, lo, hi, batch, machine) if level.corners else []
         found, lost = self.searched(level, env, lo, hi, batch, machine)
         rows = rows + corners + found
+        number = next(n for n, own in enumerate(self.plan.levels) if own is level)
+        exponents = self.plan.exponents[number]
+        if exponents is not None and (self.extent is not None or self.face is not None):  # no line of a sample
+            inner = self.plan.levels[number + 1 :]
+            beside = [row for row in rows if row.cut >= 0 and not level.level.cuts[row.cut].center]
+            rows += layer_rows(exponents, inner, level.variable, env, lo, hi, beside, batch, machine)
         return lo, hi, rows + shells(lo, hi, rows, batch), lost
 
     def resting(self, level: LevelPlan, lo: Cell, hi: Cell, seg: Segments) -> bool:

@@ -68,6 +68,7 @@ def integrated(work: PanelBatch) -> Sums:
     if work.exact and not work.enough():  # surfaces were met that coincide
         work.exact = None
         fresh = work.measure(whole, work.parent.order, True)
+    work.looks = False
     if work.last and work.parent.extent is not None:
         size = fresh.size.reshape(work.width, -1, fresh.segment.size)[:, 0].max(axis=0)
         work.parent.extent.saw_values(size / (work.seg.b - work.seg.a), work.below(work.seg.owner))

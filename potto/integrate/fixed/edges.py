@@ -1,22 +1,28 @@
-"""Where builtins stop being analytic: what is 0 there, as x is for its root.
+"""Where a rule with few nodes cannot follow builtins: at the edge of where they are analytic, as roots are at 0, and
+where they have a layer that no node may see.
 
-Owns `edges_of` and EDGE.
+Owns `edges_of`, `layers_of` and EDGE.
 """
 
 from __future__ import annotations
 
+import math
 from functools import lru_cache
 
-from potto.core.terms import Prim, Term, postorder
+from potto.core.terms import Prim, Term, const, mul, postorder, prim
 from potto.primitives import PRIMITIVES
 
 # How near to 0, of what it comes to elsewhere on the cell, the edge of a builtin's domain may be at a node.
 EDGE = 0.1
+# By how much the exponent of an exponential may change over a cell: twelve nodes don't resolve more than half of that,
+# and as long as it is not a few times more than this they see it.
+STEEPEST = 64.0
 
 
 @lru_cache(maxsize=1024)
 def edges_of(term: Term) -> tuple[Term, ...]:
-    """What is 0 where a builtin in a term is singular, poles aside, and varies."""
+    """What is 0 where a builtin in a term is singular, poles aside, and varies; or next to 0, of what it is elsewhere,
+    where it is steep."""
     found = (
         edge
         for node in postorder(term)
@@ -24,4 +30,18 @@ def edges_of(term: Term) -> tuple[Term, ...]:
         for edge in PRIMITIVES[node.op].edges(*node.args)
         if edge.free
     )
-    return tuple(dict.fromkeys(found))
+    return tuple(dict.fromkeys((*found, *layers_of(term))))
+
+
+@lru_cache(maxsize=1024)
+def layers_of(term: Term) -> tuple[Term, ...]:
+    """What falls by no more than EDGE over a cell unless an exponential in a term changes by more than STEEPEST."""
+    exponents = (
+        exponent
+        for node in postorder(term)
+        if isinstance(node, Prim)
+        for exponent in PRIMITIVES[node.op].exponents(*node.args)
+        if exponent.free
+    )
+    part = const(-math.log(EDGE) / STEEPEST)
+    return tuple(prim("exp", mul(part, exponent)) for exponent in dict.fromkeys(exponents))

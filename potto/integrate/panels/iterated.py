@@ -19,7 +19,7 @@ class Iterated(Protocol):
     """One plan being evaluated by one machine. order: the number of nodes per piece to start with.
 
     tracked: whether the integrand brings its rounding along at every node. degrees: by variable that of what is
-    integrated over it, if it is a polynomial. peaked: whether the integrand has peaks at the ends of ranges.
+    integrated over it, if it is a polynomial. peaked: the variables at ends of whose segments the integrand has peaks.
     """
 
     @property
@@ -31,7 +31,7 @@ class Iterated(Protocol):
     @property
     def tracked(self) -> bool: ...
     @property
-    def peaked(self) -> bool: ...
+    def peaked(self) -> set[int]: ...
     @property
     def degrees(self) -> tuple[int | None, ...]: ...
     @property
@@ -42,7 +42,7 @@ class Iterated(Protocol):
     def body(self, env: dict[str, Value], sides: dict[int, Mask], machine: Evaluator) -> Value: ...
     def run(
         self, number: int, env: dict[str, Value], batch: int, sides: dict[int, Mask], machine: Evaluator,
-        root: Ints | None = None, slack: Array | None = None,
+        root: Ints | None = None, slack: Array | None = None, looks: bool = False,
     ) -> Sums: ...  # fmt: skip
     def inside(
         self, number: int, env: dict[str, Value], batch: int, sides: dict[int, Mask], machine: Evaluator,

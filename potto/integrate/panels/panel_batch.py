@@ -67,6 +67,7 @@ class PanelBatch(Struct, dict=True):
     conflict: bool = False
     paired: bool = False
     rested: bool = False
+    looks: bool = False
     width: int = 1
     ends: Ends | None = None
     endless: Array | None = None  # (k, B) the tangents that are infinite, with their signs; 0 for others
@@ -90,7 +91,7 @@ class PanelBatch(Struct, dict=True):
         with np.errstate(divide="ignore", invalid="ignore"):
             off = np.maximum(self.seg.ea, self.seg.eb) / (self.seg.b - self.seg.a)
         hints = (level.peaks for level in self.parent.plan.levels[self.number :])
-        self.hinted = self.parent.peaked or any(hints)
+        self.hinted = self.number in self.parent.peaked or any(hints)
         # Whether places are not known at which sections further in cross, appear or turn.
         unsearched = any(event.variable == self.level.variable for event, _ in self.machine.events.every(Unsearched))
         self.blind = unsearched or not all(own.level.complete for own in self.parent.plan.levels[self.number + 1 :])
@@ -245,9 +246,9 @@ class PanelBatch(Struct, dict=True):
         env = gather(here, owner[flat])
         env[name] = Cell(x.reshape(-1), None, tangent)
         masks = {g: m[index[flat]] if isinstance(m, np.ndarray) else m for g, m in self.sides.items()}
-        root = self.below(owner[flat])
         less = self.spared(index, n, None if weight is None else np.broadcast_to(np.abs(weight), x.shape))
-        sums = self.parent.run(self.number + 1, env, x.size, masks, self.inner, root, less).widened(self.width)
+        further = self.number + 1, env, x.size, masks, self.inner, self.below(owner[flat]), less, self.looks
+        sums = self.parent.run(*further).widened(self.width)
         if sums.gross is not None:
             self.count_cancelling(sums, sums.gross, owner[flat])
         numbers, errors = (part.reshape(*part.shape[:2], *x.shape) for part in sums.channels())
