@@ -47,7 +47,7 @@ from potto.core.terms import (
     var,
     with_integrand,
 )  # fmt: skip
-from potto.integrate.decomposition.layers import exponents_of
+from potto.integrate.decomposition.layers import Exponents, exponents_of
 from potto.integrate.decomposition.vanishing import Vanishing
 from potto.integrate.fixed.straight import StraightIntegral, straight
 from potto.integrate.levels import Group, LevelPlan
@@ -143,7 +143,7 @@ class Plan(Struct, frozen=True, dict=True):
         return straight(integral((last.variable,), self.term.bounds[-1:], self.term.body), self.inlined, (last,))
 
     @cached_property
-    def exponents(self) -> tuple[Lam | None, ...]:
+    def exponents(self) -> tuple[Exponents | None, ...]:
         """By variable what says where exponentials in the integrand have layers."""
         if self.over is not None:
             return (None,) * len(self.levels)

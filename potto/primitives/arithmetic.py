@@ -36,7 +36,7 @@ def _power_edges(base: Term, exponent: Term) -> Terms:
 
 def _power_exponents(base: Term, exponent: Term) -> Terms:
     """Of such powers alone that have a layer where the base is 1."""
-    if isinstance(exponent, Const) and abs(exponent.value) <= PLAIN_POWER:
+    if not isinstance(exponent, Const) or abs(exponent.value) <= PLAIN_POWER:
         return ()
     return (mul(exponent, prim("log", prim("abs", base))),)
 

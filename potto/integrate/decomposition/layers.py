@@ -11,39 +11,40 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+from msgspec import Struct
 
-from potto.core.terms import Lam, Prim, Term, function_of, postorder, tuple_
+from potto.calculus.solving.enclosable import enclosable
+from potto.core.terms import Lam, Term, children, function_of, tuple_
 from potto.integrate.decomposition.meetings import Row, as_array
 from potto.integrate.levels import HINT, LevelPlan
 from potto.integrate.pieces import Evaluator, gather, numbers_at, still
+from potto.integrate.rules.intervals import Interval, enclosure
+from potto.integrate.rules.steepness import STEEPEST, change, exponents_in
 from potto.kernels.cells import Array, Cell, Ints, Value
-from potto.primitives import PRIMITIVES
 
-# By how much an exponent may change over a range whose nodes see what it is the exponent of, and by how much it has
-# changed where nothing is left to doubles.
-STEEPEST, DEPTH = 64.0, 40.0
+DEPTH = 40.0  # by how much an exponent has changed where nothing is left to doubles
 # How far from a place it is looked, in parts of the range; between two of these it is taken to be linear.
 DISTANCES = 8.0 ** -np.arange(13.0, 0.0, -1.0)
 # Where variables further in are, all of them at once, in parts of their ranges.
 PARTS = (0.0, 0.5, 1.0)
 
 
-def exponents_of(body: Term, variable: str, known: frozenset[str]) -> Lam | None:
-    """The exponents in an integrand that vary with a variable, as a tuple; None if there are none. known: the names
-    that have values."""
-    found = (
-        exponent
-        for node in postorder(body)
-        if isinstance(node, Prim)
-        for exponent in PRIMITIVES[node.op].exponents(*node.args)
-        if variable in exponent.free and exponent.free <= known
-    )
-    terms = tuple(dict.fromkeys(found))
-    return function_of(tuple_(terms)) if terms else None
+class Exponents(Struct, frozen=True):
+    """Those that vary with a variable, and all of them as a function."""
+
+    terms: tuple[Term, ...]
+    function: Lam
+
+
+def exponents_of(body: Term, variable: str, known: frozenset[str]) -> Exponents | None:
+    """The exponents in an integrand that vary with a variable; None if there are none. known: the names that have
+    values."""
+    terms = tuple(e for e in exponents_in(body) if variable in e.free and e.free <= known)
+    return Exponents(terms, function_of(tuple_(terms))) if terms else None
 
 
 def layer_rows(
-    exponents: Lam, inner: Sequence[LevelPlan], variable: str, env: Mapping[str, Value], lo: Cell, hi: Cell,
+    exponents: Exponents, inner: Sequence[LevelPlan], variable: str, env: Mapping[str, Value], lo: Cell, hi: Cell,
     rows: Sequence[Row], batch: int, machine: Evaluator,
 ) -> list[Row]:  # fmt: skip
     """Rows beside both bounds and the places of other rows, for members on whose ranges an exponent changes much.
@@ -52,10 +53,12 @@ def layer_rows(
     ends = np.stack([as_array(end.v, batch) for end in (lo, hi)])
     low, high = ends.min(axis=0), ends.max(axis=0)
     steep = np.flatnonzero(np.isfinite(low) & np.isfinite(high) & (high > low))
+    if not steep.size or not _steep_somewhere(exponents, inner, variable, env, (low[steep].min(), high[steep].max())):
+        return []
     places = np.stack((low, 0.5 * (low + high), high))[:, steep]
-    values = _at(exponents, inner, variable, env, steep, places, machine)
-    with np.errstate(invalid="ignore"):
-        steep = steep[(np.ptp(values, axis=2) > STEEPEST).any(axis=(0, 1))]
+    values = _at(exponents.function, inner, variable, env, steep, places, machine)
+    values = np.where(np.isfinite(values), values, np.nan)  # where an exponent is infinite, it is so beside no layer
+    steep = steep[(np.fmax.reduce(values, axis=2) - np.fmin.reduce(values, axis=2) > STEEPEST).any(axis=(0, 1))]
     if not steep.size:
         return []
     low, length = low[steep], (high - low)[steep]
@@ -66,7 +69,7 @@ def layer_rows(
     for way in (1.0, -1.0):
         far = way * DISTANCES[:, None, None] * length
         there = np.concatenate((middles[None], middles + far)).reshape(-1, steep.size)
-        values = _at(exponents, inner, variable, env, steep, there, machine)
+        values = _at(exponents.function, inner, variable, env, steep, there, machine)
         values = values.reshape(*values.shape[:2], 1 + DISTANCES.size, *middles.shape)
         with np.errstate(invalid="ignore"):
             change = np.nan_to_num(np.abs(values[:, :, 1:] - values[:, :, :1])).max(axis=1)
@@ -77,6 +80,24 @@ def layer_rows(
                 if np.isfinite(place).any():
                     found.append(Row(x, speed, HINT, False))
     return found
+
+
+def _steep_somewhere(
+    exponents: Exponents, inner: Sequence[LevelPlan], variable: str, env: Mapping[str, Value], ends: Interval
+) -> bool:
+    """Whether an exponent may be steep for some member, as far as an enclosure over all of them tells."""
+    box: dict[str, Interval] = {}
+    for name, value in env.items():
+        if isinstance(value, Cell):
+            box[name] = (np.min(value.v), np.max(value.v))
+    box[variable] = ends
+    for level in inner:
+        low, high = children(level.bounds.body)
+        if not ((low.free | high.free) <= box.keys() and enclosable(low) and enclosable(high)):
+            return True
+        (least, _), (_, most) = enclosure((low, high), box)
+        box[level.variable] = least, most
+    return not change(exponents.terms, box) <= STEEPEST or any(not e.free <= box.keys() for e in exponents.terms)
 
 
 def _reached(change: Array) -> Array:

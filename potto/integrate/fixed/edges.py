@@ -10,13 +10,11 @@ import math
 from functools import lru_cache
 
 from potto.core.terms import Prim, Term, const, mul, postorder, prim
+from potto.integrate.rules.steepness import STEEPEST, exponents_in
 from potto.primitives import PRIMITIVES
 
 # How near to 0, of what it comes to elsewhere on the cell, the edge of a builtin's domain may be at a node.
 EDGE = 0.1
-# By how much the exponent of an exponential may change over a cell: twelve nodes don't resolve more than half of that,
-# and as long as it is not a few times more than this they see it.
-STEEPEST = 64.0
 
 
 @lru_cache(maxsize=1024)
@@ -36,12 +34,5 @@ def edges_of(term: Term) -> tuple[Term, ...]:
 @lru_cache(maxsize=1024)
 def layers_of(term: Term) -> tuple[Term, ...]:
     """What falls by no more than EDGE over a cell unless an exponential in a term changes by more than STEEPEST."""
-    exponents = (
-        exponent
-        for node in postorder(term)
-        if isinstance(node, Prim)
-        for exponent in PRIMITIVES[node.op].exponents(*node.args)
-        if exponent.free
-    )
     part = const(-math.log(EDGE) / STEEPEST)
-    return tuple(prim("exp", mul(part, exponent)) for exponent in dict.fromkeys(exponents))
+    return tuple(prim("exp", mul(part, exponent)) for exponent in exponents_in(term))

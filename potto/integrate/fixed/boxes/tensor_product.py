@@ -8,7 +8,6 @@ machine code.)
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Iterator, Sequence
 from functools import cached_property, lru_cache
@@ -16,13 +15,14 @@ from functools import cached_property, lru_cache
 import numpy as np
 from msgspec import Struct
 
-from potto.core.terms import Lam, Term, function_of, tuple_
+from potto.core.terms import Lam, Term
 from potto.integrate.columns import run_of
-from potto.integrate.fixed.edges import EDGE, layers_of
 from potto.integrate.fixed.straight import StraightIntegral
 from potto.integrate.panels.roundoff import LOOKED_AT, NODE_ROUNDING, WITHIN, part_of
-from potto.integrate.pieces import Evaluator, Sums, components, dense, gather, numbers_at, still
+from potto.integrate.pieces import Evaluator, Sums, components, dense, gather, still
 from potto.integrate.rules.gauss import EPS, PEAK, gauss, truncation
+from potto.integrate.rules.intervals import Interval
+from potto.integrate.rules.steepness import STEEPEST, change, exponents_in
 from potto.kernels.cells import Array, Bools, Cell, Ints, Value, map_arrays
 
 # Nodes per variable: first few, then more for the boxes that need them.
@@ -49,12 +49,6 @@ class BoxIntegrand(Struct, frozen=True, dict=True, eq=False):
         """The nodes per variable that do for a polynomial."""
         nodes = (None if d is None else d // 2 + 1 for d in self.degrees)
         return tuple(n if n is not None and n <= ORDERS[-1] else None for n in nodes)
-
-    @cached_property
-    def layers(self) -> Lam | None:
-        """What is next to 0 somewhere on a box where layers may be that no node sees, if any may be."""
-        found = layers_of(self.term)
-        return function_of(tuple_(found)) if found else None
 
 
 class Bounds(Struct, frozen=True):
@@ -153,30 +147,23 @@ def _at_nodes(
     asked = np.maximum(0.5 * machine.rtol * np.abs(number), 0.5 * machine.atol / volume)
     good: Bools = (error <= np.maximum(asked, 8 * floor)).all(axis=(0, 1))
     good &= ((part < 1) & (found.peaks <= PEAK * found.largest)).all(axis=0)
-    if face.layers is not None and None in face.exact:
-        good &= _even(face.layers, face.plan.variables, machine.with_directions(0), env, bounds)
+    if None in face.exact:
+        good &= _even(face, env, bounds)
     error += floor
     total, bound, most = number * volume, error * volume, most.max(axis=0) * volume
     gross = np.stack((most[0], most[1:].max(axis=0, initial=0.0)))
     return Sums(total[:, 0], bound[:, 0], total[:, 1:], bound[:, 1:], gross=gross), good
 
 
-def _even(
-    layers: Lam, variables: Sequence[str], machine: Evaluator, env: dict[str, Value], bounds: Bounds
-) -> Bools:  # fmt: skip
-    """On which boxes exponents are about the same at all corners and in the middle."""
-    here = {name: still(env[name]) for name in layers.params if name in env}
-    corners = [*itertools.product((0, 2), repeat=len(variables)), (1,) * len(variables)]
-    for number, variable in enumerate(variables):
-        low, high = bounds.low[number], bounds.high[number]
-        places = low, 0.5 * (low + high), high
-        here[variable] = Cell(np.stack([places[corner[number]] for corner in corners]))
-    fine = np.ones(bounds.low.shape[1], dtype=bool)
-    with np.errstate(all="ignore"):
-        for cell in numbers_at(layers, machine, {name: here[name] for name in layers.params}):
-            size = np.broadcast_to(cell.v, (len(corners), fine.size))
-            fine &= size.min(axis=0) > EDGE * size.max(axis=0)
-    return fine
+def _even(face: BoxIntegrand, env: dict[str, Value], bounds: Bounds) -> Bools:
+    """On which boxes no exponent is so steep that there may be layers which no node sees."""
+    exponents = exponents_in(face.term)
+    if not exponents:
+        return np.ones(bounds.low.shape[1], dtype=bool)
+    box: dict[str, Interval] = {name: (cell.v, cell.v) for name, cell in env.items() if isinstance(cell, Cell)}
+    box |= {name: (bounds.low[n], bounds.high[n]) for n, name in enumerate(face.plan.variables)}
+    even: Bools = np.broadcast_to(~(change(exponents, box) > STEEPEST), bounds.low.shape[1:])
+    return even
 
 
 def _share(face: BoxIntegrand, machine: Evaluator, env: dict[str, Value], low: Array, size: Array) -> Array:
