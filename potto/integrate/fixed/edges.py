@@ -19,8 +19,7 @@ EDGE = 0.1
 
 @lru_cache(maxsize=1024)
 def edges_of(term: Term) -> tuple[Term, ...]:
-    """What is 0 where a builtin in a term is singular, poles aside, and varies; or next to 0, of what it is elsewhere,
-    where it is steep."""
+    """What is 0 where a builtin in a term is singular, poles aside, and varies."""
     found = (
         edge
         for node in postorder(term)
@@ -28,7 +27,7 @@ def edges_of(term: Term) -> tuple[Term, ...]:
         for edge in PRIMITIVES[node.op].edges(*node.args)
         if edge.free
     )
-    return tuple(dict.fromkeys((*found, *layers_of(term))))
+    return tuple(dict.fromkeys(found))
 
 
 @lru_cache(maxsize=1024)

@@ -18,6 +18,8 @@ from potto.integrate.fixed.edges import EDGE, edges_of
 from potto.integrate.fixed.moving_sums import product
 from potto.integrate.fixed.straight import RowNumbers, StraightIntegral, rows_between
 from potto.integrate.pieces import Evaluator, dense, numbers_at, still
+from potto.integrate.rules.intervals import Interval
+from potto.integrate.rules.steepness import STEEPEST, change, exponents_in
 from potto.kernels.cells import Array, Bools, Cell, Ints, Value, map_arrays
 from potto.kernels.whole import UNIT_ROUNDOFF
 
@@ -123,8 +125,8 @@ class _Cells(Struct, frozen=True):
 
     def clear_of_edges(self, machine: Evaluator, here: dict[str, Value], shape: tuple[int, ...]) -> Bools:
         """The members on whose cells nothing comes to the edge of where it is analytic, as a root of x does at 0: there
-        coefficients fall so slowly that they don't tell."""
-        fine, found = np.ones(shape[-1], dtype=bool), edges_of(self.face)
+        coefficients fall so slowly that they don't tell; nor do they where an exponent is steep."""
+        fine, found = self.even(here, shape[-1]), edges_of(self.face)
         if not found:
             return fine
         edges = function_of(tuple_(found))
@@ -132,6 +134,19 @@ class _Cells(Struct, frozen=True):
             size = np.broadcast_to(np.abs(cell.v), shape)[:, *_between(len(shape) - 2)].reshape(-1, shape[-1])
             fine &= size.min(axis=0) > EDGE * size.max(axis=0)
         return fine
+
+    def even(self, here: Mapping[str, Value], count: int) -> Bools:
+        """The members on whose cells no exponent changes by more than nodes see."""
+        exponents = exponents_in(self.face)
+        if not exponents:
+            return np.ones(count, dtype=bool)
+        box: dict[str, Interval] = {}
+        for name, cell in here.items():
+            if isinstance(cell, Cell):
+                rows = np.atleast_1d(cell.v)
+                rows = rows.reshape(-1, rows.shape[-1])
+                box[name] = rows.min(axis=0), rows.max(axis=0)
+        return np.array(np.broadcast_to(~(change(exponents, box) > STEEPEST), count))
 
     def added(self, nodes: Nodes) -> tuple[Array, list[Array]]:
         """What the nodes amount to, (1 + k, M), and the sizes of coefficients along each variable."""

@@ -14,7 +14,7 @@ import numpy as np
 
 from potto.core.terms import Term, function_of
 from potto.integrate.fixed.axes import ENDS
-from potto.integrate.fixed.edges import EDGE, edges_of
+from potto.integrate.fixed.edges import EDGE, edges_of, layers_of
 from potto.integrate.fixed.lowered.formula_text import Dual, Env, ParameterPlace, Symbol, still
 from potto.integrate.fixed.lowered.row_text import RowText
 from potto.integrate.fixed.straight import ROW_BITS, StraightIntegral, row_shift
@@ -44,7 +44,7 @@ class RuleText(RowText):
 
     def __init__(self, plan: StraightIntegral, face: Term, machine: Evaluator, lanes: int = LANES) -> None:
         super().__init__(plan, machine, lanes)
-        self.face, self.edges = function_of(face), [function_of(edge) for edge in edges_of(face)]
+        self.face, self.edges = function_of(face), [function_of(edge) for edge in (*edges_of(face), *layers_of(face))]
         self.channels = self.k1
 
     def text(self, places: Sequence[ParameterPlace]) -> str:
