@@ -21,7 +21,7 @@ from potto.calculus.decomposition.critical import (
     scattered,
     shadows,
 )
-from potto.calculus.decomposition.strata import Stratum, met
+from potto.calculus.decomposition.strata import Stratum, known, met
 from potto.calculus.decomposition.surface_cuts import RATIONAL, Cut, along, sections_in
 from potto.calculus.solving.enclosable import slope_of
 from potto.calculus.solving.solve import Sections
@@ -29,8 +29,8 @@ from potto.core.simplify import simplify
 from potto.core.terms import Branch, Prim, Term, postorder, sub, substitute, var
 
 # Surfaces whose crossings are worked out, if they are kinks: those of crossings come to hundreds; the same, if they are
-# jumps, or if it is known where in space they come from, since few of these meet.
-MOST_PAIRS, MOST_JUMPS = 12, 48
+# jumps, or if it is known where in space they come from, since few of these meet: not so where variables are more.
+MOST_PAIRS, MOST_JUMPS, IN_SPACE = 12, 48, 3
 MOST_SYSTEMS = 600  # whose places are projected further out: pairs of surfaces, of which 34 have so many
 
 
@@ -84,7 +84,7 @@ def shadows_of_cuts(
     for cut in (*cuts, *conics):
         yield from _at_bounds(cut, here.within, False)
         yield from _turning(cut, here)
-    meeting, _ = crossing(cuts, here.variable, here.further)
+    meeting, _ = crossing(cuts, here.variable, here.further, here.names)
     for first in meeting:
         for second in meeting:
             if first is not second and first.key.digest < second.key.digest:
@@ -133,11 +133,16 @@ def _turning(cut: Cut, here: Here, steps: bool = False) -> Iterator[Shadow | Cri
             yield Shadow(substitute(surface, {variable: stop}), True, False)
 
 
-def crossing(cuts: Sequence[Cut], variable: str, further: frozenset[str]) -> tuple[list[Cut], bool]:
-    """The cuts whose crossings are worked out, and whether those are all that may cross."""
+def crossing(
+    cuts: Sequence[Cut], variable: str, further: frozenset[str], names: frozenset[str]
+) -> tuple[list[Cut], bool]:
+    """The cuts whose crossings are worked out, and whether those are all that may cross. names: the variables of
+    integration."""
     meeting = [c for c in cuts if c.roots or c.families or c.roots is None]
     meeting = [c for c in meeting if not scattered(along(c), variable, further)]
-    chosen = [c for n, c in enumerate(meeting) if n < (MOST_JUMPS if c.decides or c.strata else MOST_PAIRS)]
+    few = len(names) <= IN_SPACE
+    most = [MOST_JUMPS if c.decides or (few and known(c.strata, names)) else MOST_PAIRS for c in meeting]
+    chosen = [c for n, c in enumerate(meeting) if n < most[n]]
     return chosen, chosen == meeting
 
 

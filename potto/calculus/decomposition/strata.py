@@ -1,14 +1,14 @@
 """Where in space the cuts of a variable come from: strata, on which some surfaces are 0 and may be turning.
 
-Owns `Stratum`, `own` and `met`. What is integrated over variables further in is smooth in one further out but where
-that is critical on a stratum: on a face, an edge where two surfaces meet, or at a vertex (Thom's isotopy lemma; Goresky
-and MacPherson, Stratified Morse Theory, 1988). The shadows of two edges that pass each other in space cross all the
-same, and silhouettes touch those of edges: nothing happens there.
+Owns `Stratum`, `own`, `known` and `met`. What is integrated over variables further in is smooth in one further out but
+where that is critical on a stratum: on a face, an edge where two surfaces meet, or at a vertex (Thom's isotopy lemma;
+Goresky and MacPherson, Stratified Morse Theory, 1988). The shadows of two edges that pass each other in space cross all
+the same, and silhouettes touch those of edges: nothing happens there.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 from msgspec import Struct
 
@@ -47,13 +47,19 @@ def own(surface: Term) -> tuple[Stratum, ...]:
     return (Stratum(frozenset((surface,))),)
 
 
+def known(strata: Sequence[Stratum], names: frozenset[str]) -> bool:
+    """Whether it can be told which others strata meet: they are some, of surfaces of degree 2 in the variables of
+    integration."""
+    return bool(strata) and all(quadric(s, names) for stratum in strata for s in stratum.surfaces)
+
+
 def met(
     first: Iterable[Stratum], second: Iterable[Stratum], inner: frozenset[str], names: frozenset[str]
 ) -> tuple[Stratum, ...] | None:  # fmt: skip
     """The strata in which those of two cuts meet; None where that can't be told, of unknown ones (none), and where a
     surface may have edges of its own. names: the variables of integration."""
     one, other = tuple(first), tuple(second)
-    if not (one and other) or not all(quadric(s, names) for stratum in (*one, *other) for s in stratum.surfaces):
+    if not (known(one, names) and known(other, names)):
         return None
     found = dict.fromkeys(
         Stratum(a.surfaces | b.surfaces, a.folded | b.folded) for a in one for b in other if a.meets(b, inner)

@@ -194,9 +194,10 @@ def _level(
     within = Within(variable, *bounds)
     region, (lines, conics), covers = conic_region(decisive, within, further, polynomial)
     alone = [cut for cut in decisive if cut not in lines and cut not in conics]
-    complete = len(others) <= MOST_CUTS and crossing((*alone, *others), variable, further)[1]
+    names = frozenset(pool.variables)
+    complete = len(others) <= MOST_CUTS and crossing((*alone, *others), variable, further, names)[1]
     pool.within.append(within)
-    here = Here(tuple(pool.within), further, nearest, frozenset(pool.variables))
+    here = Here(tuple(pool.within), further, nearest, names)
     cuts = (*decisive, *others[:MOST_CUTS])
     (centers, systems), edges = pool.take_points(variable), pool.take_edges(variable)
     along_own = None if over is None else cut_along(over.surface, variable)
