@@ -22,7 +22,9 @@ from potto.integrate.rules.intervals import Interval, enclosure
 from potto.integrate.rules.steepness import STEEPEST, change, exponents_in
 from potto.kernels.cells import Array, Cell, Ints, Value
 
-DEPTH = 40.0  # by how much an exponent has changed where nothing is left to doubles
+# By how much an exponent has changed where nothing is left to doubles; and beyond which exponentials are 0 or infinite,
+# and what saturates has done so.
+DEPTH, GONE = 40.0, 745.0
 # How far from a place it is looked, in parts of the range; between two of these it is taken to be linear.
 DISTANCES = 8.0 ** -np.arange(13.0, 0.0, -1.0)
 # Where variables further in are, all of them at once, in parts of their ranges.
@@ -72,8 +74,10 @@ def layer_rows(
         values = _at(exponents.function, inner, variable, env, steep, there, machine)
         values = values.reshape(*values.shape[:2], 1 + DISTANCES.size, *middles.shape)
         with np.errstate(invalid="ignore"):
-            change = np.nan_to_num(np.abs(values[:, :, 1:] - values[:, :, :1])).max(axis=1)
-        for own in _reached(change) * length:
+            here, beyond = values[:, :, :1], values[:, :, 1:]
+            gone = (np.abs(here) > GONE) & (np.abs(beyond) > GONE) & (here * beyond > 0)
+            changes = np.nan_to_num(np.where(gone, 0.0, np.abs(beyond - here))).max(axis=1)
+        for own in _reached(changes) * length:
             for place, (_, speed) in zip(middles + way * own, beside, strict=True):
                 x = np.full(batch, np.nan)
                 x[steep] = place

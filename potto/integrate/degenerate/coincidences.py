@@ -64,7 +64,8 @@ def count_places(scene: IteratedVariable, cuts: Cuts, sums: Sums) -> None:
         sums.t[:, :, owner] = base + (forward if counts else np.where(differ, 0.0, forward))
         two = differ.any(axis=(0, 1))
         if counts and scene.slack is not None:  # of nodes with next to no weight it is part of what they may be off by
-            nothing = np.abs(forward - backward) <= scene.slack[owner] * machine.rtol * (np.abs(base) + scale)
+            with np.errstate(invalid="ignore"):  # of a node with no weight at all, for which slack is infinite
+                nothing = ~(np.abs(forward - backward) > scene.slack[owner] * machine.rtol * (np.abs(base) + scale))
             sums.et[:, :, owner] += np.where(nothing, np.abs(forward - backward), 0.0)
             two &= ~nothing.all(axis=(0, 1))
         if two.any():
