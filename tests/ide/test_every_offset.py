@@ -4,6 +4,7 @@ nothing outside of it. `make fuzz` asks at every offset, `make test` here and th
 from __future__ import annotations
 
 import random
+from functools import cache
 from itertools import pairwise
 from pathlib import Path
 
@@ -19,8 +20,14 @@ EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 FILES = sorted(str(path.relative_to(EXAMPLES)) for suffix in ("po", "diffeo") for path in EXAMPLES.rglob(f"*.{suffix}"))
 
 
+@cache
+def unchanged() -> Library:
+    """One for all that ask about the examples as they are: what is worked out for one is there for the others."""
+    return Library([EXAMPLES])
+
+
 def opened(name: str, text: str | None = None) -> tuple[Library, str, str]:
-    library = Library([EXAMPLES])
+    library = unchanged() if text is None else Library([EXAMPLES])
     file = library.files.open(EXAMPLES / name)
     if text is not None:
         library.files.set_text(file, text)
@@ -159,7 +166,7 @@ def test_every_feature_on_broken_text(seed: int) -> None:
     name = FILES[seed]
     original = (EXAMPLES / name).read_text(encoding="utf-8")
     library, file, text = opened(name, mutated(original, rng))
-    ask_everything(library, file, text, sorted(rng.sample(range(len(text) + 1), min(examples(20, 40), len(text) + 1))))
+    ask_everything(library, file, text, sorted(rng.sample(range(len(text) + 1), min(examples(12, 40), len(text) + 1))))
 
 
 @pytest.mark.slow
