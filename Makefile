@@ -10,7 +10,8 @@ EXTRAS ?= dev
 SHARED := 'import sysconfig; p = sysconfig.get_path("purelib"); open(p + "/shared.pth", "w").write(p.replace(".venv-native", "$(VENV)"))'
 
 TORCH ?= torch==2.13.0
-TESTS := $(BIN)/python -m pytest -n auto --maxprocesses 8 --dist worksteal --durations 20
+WORKERS ?= auto
+TESTS := $(BIN)/python -m pytest -n $(WORKERS) --maxprocesses 8 --dist worksteal --durations 20
 
 .PHONY: tables docs wheels demo gallery test quick fuzz lint check format clean native machine-code pictures test-bridges hours vsix e2e
 

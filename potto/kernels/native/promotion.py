@@ -59,8 +59,8 @@ class Promotion:
 
     @property
     def due(self) -> bool:
-        """Whether numpy has done it for long enough, so that the function is to be asked for."""
-        return self._ready is not None or self._pays()
+        """Whether the function is to be asked for: numpy has done it for long enough, and it is not on its way."""
+        return self._pays() if self._coming is None else self._coming.done()
 
     def by_numpy(self) -> ByNumpy:
         """A block whose time counts as that of numpy: the processor's, whoever else is using it. Kernels that are made
