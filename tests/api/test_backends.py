@@ -8,7 +8,9 @@ import multiprocessing
 import os
 import subprocess
 import sys
+import threading
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,6 +18,7 @@ import pytest
 import potto
 from potto.kernels.making import counts
 from potto.kernels.native import objects, points, promotion
+from potto.runtime.integration import direct
 
 needs_llvm = pytest.mark.skipif(importlib.util.find_spec("llvmlite") is None, reason="llvmlite is not installed")
 TEXT = "def f(c) integral ([0, 1], [0, 1]) 1/(x + y + c + 2)^2*[x + y + c >= 0] d(x, y)"
@@ -87,6 +90,32 @@ def test_numpy_goes_on_where_llvm_fails(monkeypatch: pytest.MonkeyPatch) -> None
         for _ in range(20):
             held(function(WHERE - 0.25), d)
     assert counts.native_points == before
+
+
+@needs_llvm
+def test_calls_go_on_as_they_were_while_machine_code_is_on_its_way(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Near what is settled numpy adds up at once: one call after the other is not worked out from the beginning."""
+    ready, made, whole = threading.Event(), objects.made, []
+
+    def waiting(*of: Any) -> Any:
+        ready.wait(60)
+        return made(*of)
+
+    def noted(*of: Any) -> Any:
+        whole.append(of)
+        return proved_sum(*of)
+
+    proved_sum = direct.proved_sum
+    monkeypatch.setattr(objects, "made", waiting)
+    monkeypatch.setattr(direct, "proved_sum", noted)
+    for cost in ("LLVM", "LEAST", "LINE", "WRITTEN"):
+        monkeypatch.setattr(promotion, cost, 0.0)
+    function = potto.deriv(potto.compile(TEXT.replace("2)", "2.015625)")).f)
+    with potto.settings(backend="auto"):
+        for n in range(200):
+            function((-0.7 + 1e-6 * n, 1.0))
+    ready.set()
+    assert 0 < len(whole) < 20
 
 
 @needs_llvm
