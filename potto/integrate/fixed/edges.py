@@ -1,16 +1,13 @@
-"""Where a rule with few nodes cannot follow builtins: at the edge of where they are analytic, as roots are at 0, and
-where they have a layer that no node may see.
+"""Where a rule with few nodes cannot follow builtins: at the edge of where they are analytic, as roots are at 0.
 
-Owns `edges_of`, `layers_of` and EDGE.
+Owns `edges_of` and EDGE.
 """
 
 from __future__ import annotations
 
-import math
 from functools import lru_cache
 
-from potto.core.terms import Prim, Term, const, mul, postorder, prim
-from potto.integrate.rules.steepness import STEEPEST, exponents_in
+from potto.core.terms import Prim, Term, postorder
 from potto.primitives import PRIMITIVES
 
 # How near to 0, of what it comes to elsewhere on the cell, the edge of a builtin's domain may be at a node.
@@ -28,10 +25,3 @@ def edges_of(term: Term) -> tuple[Term, ...]:
         if edge.free
     )
     return tuple(dict.fromkeys(found))
-
-
-@lru_cache(maxsize=1024)
-def layers_of(term: Term) -> tuple[Term, ...]:
-    """What falls by no more than EDGE over a cell unless an exponential in a term changes by more than STEEPEST."""
-    part = const(-math.log(EDGE) / STEEPEST)
-    return tuple(prim("exp", mul(part, exponent)) for exponent in exponents_in(term))

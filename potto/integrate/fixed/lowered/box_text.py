@@ -15,7 +15,6 @@ from msgspec import Struct
 
 from potto.core.terms import Lam, Term, Tuple, children, function_of
 from potto.integrate.fixed.axes import ENDS
-from potto.integrate.fixed.edges import EDGE, layers_of
 from potto.integrate.fixed.lowered.formula_text import ParameterPlace, Symbol, still
 from potto.integrate.fixed.lowered.rule_text import RuleText
 from potto.integrate.fixed.straight import StraightIntegral
@@ -91,21 +90,17 @@ class BoxText(RuleText):
             at.begin("1", at.any(mask))
             self.low, self.high, self.sizes = (list(map(at.again, ends)) for ends in bounds)
             self.face = function_of(face)
-            self.layers = [(function_of(layer), at.room(1), at.room(1)) for layer in layers_of(face)]
             for added, n in zip(self.added, self.orders, strict=True):
                 self.fill(added, str(n), each)
-            for room in (*self.most, *self.own, *self.largest, *self.peaks, *(most for *_, most in self.layers)):
+            for room in (*self.most, *self.own, *self.largest, *self.peaks):
                 at.store(self.zero, room)
-            for _, least, _ in self.layers:
-                at.store(at.number(float("inf")), least)
             means = [x or self.zero for x in self.mean(0, here, self.one)]
             standing = {name: still(symbol) for name, symbol in here.items()}
+            even: list[str] = []
             if not all(self.exact):
                 self.at_corners(0, standing)
-                half = at.number(0.5)
-                middle = {x: Symbol(self.between(i, half), None, (), ()) for i, x in enumerate(self.plan.variables)}
-                self.at_layers({**standing, **middle})
-            self.results(means, self.shares(standing), mask)
+                even = self.even(face, here, self.box)
+            self.results(means, self.shares(standing), mask, even)
             at.end()
         return self.end()
 
@@ -164,15 +159,13 @@ class BoxText(RuleText):
 
     def enclosed(self, here: Mapping[str, Symbol]) -> list[Names]:
         """Bounds of the other surfaces."""
-        box = {name: self.range(symbol) for name, symbol in here.items()}
-        box |= dict(zip(self.plan.variables, map(Names, self.low, self.high), strict=True))
+        box = {name: self.range(symbol) for name, symbol in here.items()} | self.box
         return WrittenInterval(self.at).walk(self.look.curved, box, {}) if self.look.curved else []
 
-    def range(self, symbol: Symbol) -> Names:
-        """What a parameter can be."""
-        if symbol.e is None:
-            return Names(symbol.v, symbol.v)
-        return Names(self.at.apply("sub", symbol.v, symbol.e), self.at.apply("add", symbol.v, symbol.e))
+    @property
+    def box(self) -> dict[str, Names]:
+        """Where the variables are."""
+        return dict(zip(self.plan.variables, map(Names, self.low, self.high), strict=True))
 
     def among(self, decided: str, sides: Sequence[tuple[str, str]], codes: Sequence[int]) -> str:
         """Whose sides are one of these."""
@@ -241,16 +234,7 @@ class BoxText(RuleText):
                 self.peaks, self.evaluated(self.face, inner, self.machine.with_directions(0)), strict=True
             ):
                 self.raise_to(room, self.finite(at.apply("abs", cell.v)))
-            self.at_layers(inner)
         at.end()
-
-    def at_layers(self, env: dict[str, Symbol]) -> None:
-        """Note the least and the most of what tells of layers at a place."""
-        at = self.at
-        for layer, least, most in self.layers:
-            (cell,) = self.evaluated(layer, env, self.machine.with_directions(0))
-            at.store(at.apply("min", at.load(least), cell.v), least)
-            self.raise_to(most, cell.v)
 
     def between(self, i: int, u: str) -> str:
         """Where variable i is, at a place of [0, 1]."""
@@ -275,7 +259,9 @@ class BoxText(RuleText):
 
     # What they amount to
 
-    def results(self, means: Sequence[str], shares: Sequence[str | None], mask: str) -> None:
+    def results(
+        self, means: Sequence[str], shares: Sequence[str | None], mask: str, even: Sequence[str]
+    ) -> None:  # fmt: skip
         """Put the integrals of the members of a mask for whom the rule does. shares: what their own rounding is."""
         at, k1 = self.at, self.k1
         volume = self.sizes[0]
@@ -306,11 +292,7 @@ class BoxText(RuleText):
         for peak, room in zip(self.peaks, self.largest, strict=True):
             seen = at.apply("mul", at.number(PEAK), at.load(room))
             good = at.apply("and", good, at.apply("le", at.load(peak), seen))
-        if not all(self.exact):
-            for _, least, room in self.layers:
-                seen = at.apply("mul", at.number(EDGE), at.load(room))
-                good = at.apply("and", good, at.apply("gt", at.load(least), seen))
-        good = self.all([good, *(at.apply("lt", part, self.one) for part in shares if part is not None)])
+        good = self.all([good, *even, *(at.apply("lt", part, self.one) for part in shares if part is not None)])
         most = [at.load(room) for room in self.most]
         gross = [most[::k1], [x for c, x in enumerate(most) if c % k1] or [self.zero]]
         rows = [*means, *bounds]

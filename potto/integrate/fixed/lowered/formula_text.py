@@ -11,8 +11,10 @@ from typing import Any
 
 from msgspec import Struct
 
-from potto.core.terms import Lam
+from potto.core.terms import Lam, Term
 from potto.integrate.pieces import Evaluator
+from potto.integrate.rules.steepness import STEEPEST, exponents_in
+from potto.integrate.rules.written_intervals import Names, WrittenInterval
 from potto.kernels.native.operations import NotStraight
 from potto.kernels.native.straight import ArgumentPart, FlatKernel, Packed, packed
 from potto.kernels.native.vectors import LANES, Vectors
@@ -136,6 +138,24 @@ class FormulaText:
         value = part(cell.v)
         assert value is not None
         return Symbol(value, part(cell.e), tuple(map(part, cell.t)), tuple(map(part, cell.et)))
+
+    # Enclosures
+
+    def range(self, symbol: Symbol) -> Names:
+        """What a number can be."""
+        if symbol.e is None:
+            return Names(symbol.v, symbol.v)
+        return Names(self.at.apply("sub", symbol.v, symbol.e), self.at.apply("add", symbol.v, symbol.e))
+
+    def even(self, face: Term, env: Mapping[str, Symbol], spans: Mapping[str, Names]) -> list[str]:
+        """Masks that together tell where no exponent in an integrand changes by more than nodes see, as
+        `steepness.change` tells it by numpy; spans: where variables are. Where bounds overflow that is not known."""
+        exponents, masks = exponents_in(face), []
+        box = {name: self.range(env[name]) for name in frozenset().union(*(x.free for x in exponents)) - spans.keys()}
+        for found in WrittenInterval(self.at).walk(exponents, {**box, **spans}, {}):
+            change = self.at.apply("sub", found.high, found.low)
+            masks.append(self.at.apply("le", change, self.at.number(STEEPEST)))
+        return masks
 
     # Arithmetic of what may be 0
 

@@ -14,11 +14,13 @@ import numpy as np
 
 from potto.core.terms import Term, function_of
 from potto.integrate.fixed.axes import ENDS
-from potto.integrate.fixed.edges import EDGE, edges_of, layers_of
+from potto.integrate.fixed.edges import EDGE, edges_of
 from potto.integrate.fixed.lowered.formula_text import Dual, Env, ParameterPlace, Symbol, still
 from potto.integrate.fixed.lowered.row_text import RowText
 from potto.integrate.fixed.straight import ROW_BITS, StraightIntegral, row_shift
 from potto.integrate.pieces import Evaluator
+from potto.integrate.rules.steepness import exponents_in
+from potto.integrate.rules.written_intervals import Names
 from potto.kernels.native.elementary import module
 from potto.kernels.native.vectors import LANES
 from potto.kernels.whole import UNIT_ROUNDOFF
@@ -44,7 +46,8 @@ class RuleText(RowText):
 
     def __init__(self, plan: StraightIntegral, face: Term, machine: Evaluator, lanes: int = LANES) -> None:
         super().__init__(plan, machine, lanes)
-        self.face, self.edges = function_of(face), [function_of(edge) for edge in (*edges_of(face), *layers_of(face))]
+        self.face, self.edges = function_of(face), [function_of(edge) for edge in edges_of(face)]
+        self.exponents = exponents_in(face)
         self.channels = self.k1
 
     def text(self, places: Sequence[ParameterPlace]) -> str:
@@ -78,15 +81,22 @@ class RuleText(RowText):
 
     def rounded(self, here: Env) -> tuple[Dual, Dual]:
         """The most that is added up over the cells, and what rounding puts it off; that none comes to the edge of where
-        a builtin is analytic is noted."""
+        a builtin is analytic, nor changes more than nodes see, is noted."""
         at = self.at
         bounds = [(at.room(1), at.room(1)) for _ in self.edges]
         for least, most in bounds:
             at.store(at.number(np.inf), least)
             at.store(self.zero, most)
+        self.spans = [(at.room(1), at.room(1)) for _ in self.plan.variables if self.exponents]
+        for least, most in self.spans:
+            at.store(at.number(np.inf), least)
+            at.store(at.number(-np.inf), most)
         found = self.few(0, here, bounds)
         for least, most in bounds:
             self.only(at.apply("gt", at.load(least), at.apply("mul", at.number(EDGE), at.load(most))))
+        spans = (Names(at.load(least), at.load(most)) for least, most in self.spans)
+        for mask in self.even(self.face.body, here, dict(zip(self.plan.variables, spans, strict=False))):
+            self.only(mask)
         return found
 
     # Columns of numbers
@@ -213,6 +223,8 @@ class RuleText(RowText):
         for mask, side in zip(ends, lost, strict=not last):
             errors = [self.either(mask, x, y) for x, y in zip(side, errors, strict=True)]
         here = {**env, self.plan.variables[i]: self.node(low, width, at.constant(nodes, j), errors)}
+        if self.spans:
+            self.reach(self.spans[i], here[self.plan.variables[i]].v)
         most, off = self.at_node(here, bounds, outside) if last else self.few(i + 1, here, bounds, [*outside, *ends])
         speed, after = at.constant(speeds, j), list[str | None]()
         for c, (x, y) in enumerate(zip(most, off, strict=True)):
@@ -235,6 +247,11 @@ class RuleText(RowText):
                 there = [self.finite_or(x, plain, other) for x, other in zip(reached, largest, strict=True)]
             slack.append(self.product(there, side))
         return self.product(largest, sizes), list(map(self.total, self.product(worst, sizes), *slack))
+
+    def reach(self, span: tuple[str, str], value: str) -> None:
+        """Note where a variable has been."""
+        for code, place in zip(("min", "max"), span, strict=True):
+            self.at.store(self.at.apply(code, self.at.load(place), value), place)
 
     def at_node(self, env: Env, bounds: Sequence[tuple[str, str]], outside: Sequence[str]) -> tuple[Dual, Dual]:
         """The size of the integrand, and its rounding."""

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -52,12 +52,9 @@ class Crowded(_NotPlain):
 
 
 def _cells(
-    plan: StraightIntegral,
-    machine: Evaluator,
-    env: dict[str, Value],
-    frame: tuple[Cell, ...],
+    plan: StraightIntegral, machine: Evaluator, env: dict[str, Value], frame: tuple[Cell, ...],
     ties: OnBounds | None = None,
-) -> tuple[tuple[Stretch, ...], float]:
+) -> tuple[tuple[Stretch, ...], float]:  # fmt: skip
     """The cells between the cuts, with the integrand on each; those on which it is 0 left out. And the least length.
 
     frame: the bounds and cuts of the outermost variable. ties: what to do with cuts that lie on bounds.
@@ -66,25 +63,32 @@ def _cells(
     tracked = machine.with_directions(machine.directions if moves else 0).tracking()
     cells: list[Stretch] = []
     here, shortest = dict(env), math.inf
-
-    def over(i: int, path: Path) -> None:
-        nonlocal shortest
-        if i == len(plan.variables):
-            face = plan.face(_sides(plan, tracked, here))
-            dark = vanishes(face)
-            if machine.costs is not None:
-                machine.costs.stretches(1, 0 if dark else 1)
-            if not dark:
-                cells.append(Stretch(path, face))
-            return
-        values = numbers_at(plan.frames[i], tracked, here) if i else frame
-        for low, high, middle, length in _stretches(plan, i, tracked, values, ties):
-            here[plan.variables[i]] = Cell(middle)
-            shortest = min(shortest, length or math.inf)
-            over(i + 1, (*path, (low, high)))
-
-    over(0, ())
+    for path, least in _paths(plan, tracked, here, frame, ties, ()):
+        shortest = min(shortest, least)
+        face = plan.face(_sides(plan, tracked, here))
+        dark = vanishes(face)
+        if machine.costs is not None:
+            machine.costs.stretches(1, 0 if dark else 1)
+        if not dark:
+            cells.append(Stretch(path, face))
     return tuple(cells), shortest
+
+
+def _paths(
+    plan: StraightIntegral, machine: Evaluator, here: dict[str, Value], frame: tuple[Cell, ...],
+    ties: OnBounds | None, path: Path,
+) -> Iterator[tuple[Path, float]]:  # fmt: skip
+    """Between which rows each cell within a path lies, while the variables are in its middle, and the least length of
+    its stretches."""
+    i = len(path)
+    if i == len(plan.variables):
+        yield path, math.inf
+        return
+    values = numbers_at(plan.frames[i], machine, here) if i else frame
+    for low, high, middle, length in _stretches(plan, i, machine, values, ties):
+        here[plan.variables[i]] = Cell(middle)
+        for found, least in _paths(plan, machine, here, frame, ties, (*path, (low, high))):
+            yield found, min(least, length or math.inf)
 
 
 def _stretches(
