@@ -77,7 +77,7 @@ def renamed(node: Term, names: Mapping[str, str]) -> Term:
         case Integral(variables=variables, bounds=bounds):
             return integral(tuple(names.get(v, v) for v in variables), bounds, node.body, node.hints)
         case Sum(variable=name):
-            return sum_(names.get(name, name), node.lo, node.hi, node.body)
+            return sum_(names.get(name, name), node.lo, node.hi, node.body, node.endless)
         case Array(variable=name):
             return array(names.get(name, name), node.size, node.body)
         case Fold(variable=name, state=state):

@@ -153,12 +153,16 @@ class Delta(Base, frozen=True, eq=False):
 
 
 class Sum(Base, frozen=True, eq=False):
-    """The sum of `body` for the integers `variable` from `lo` to `hi`, both included; 0 when there are none."""
+    """The sum of `body` for the integers `variable` from `lo` to `hi`, both included; 0 when there are none.
+
+    An `endless` one goes on beyond `hi` for as long as its terms matter: these fall off in the end.
+    """
 
     variable: str
     lo: Term
     hi: Term
     body: Term
+    endless: bool
 
 
 class Fold(Base, frozen=True, eq=False):
@@ -360,8 +364,13 @@ def delta(coordinates: tuple[Term, ...]) -> Delta:
     return make(Delta, union_of(coordinates), coordinates)
 
 
-def sum_(variable: str, lo: Term, hi: Term, body: Term) -> Sum:
-    return make(Sum, lo.free | hi.free | body.free.difference((variable,)), variable, lo, hi, body)
+def sum_(variable: str, lo: Term, hi: Term, body: Term, endless: bool = False) -> Sum:
+    return make(Sum, lo.free | hi.free | body.free.difference((variable,)), variable, lo, hi, body, endless)
+
+
+def with_summand(term: Sum, body: Term) -> Sum:
+    """The sum of something else over the same numbers."""
+    return sum_(term.variable, term.lo, term.hi, body, term.endless)
 
 
 def fold(variable: str, lo: Term, hi: Term, state: str, start: Term, body: Term) -> Fold:

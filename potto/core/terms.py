@@ -64,6 +64,7 @@ from potto.core.kinds import sum_ as sum_
 from potto.core.kinds import tuple_ as tuple_
 from potto.core.kinds import var as var
 from potto.core.kinds import with_integrand as with_integrand
+from potto.core.kinds import with_summand as with_summand
 from potto.core.rebuilding import rebuilt as rebuilt
 from potto.core.walking import Holding as Holding
 from potto.core.walking import bound_apart as bound_apart

@@ -128,7 +128,8 @@ def rebuild(term: Term, parts: tuple[Term, ...]) -> Term:
         case Delta():
             return delta(parts)
         case Sum():
-            return sum_(term.variable, *parts)
+            lo, hi, body = parts
+            return sum_(term.variable, lo, hi, body, term.endless)
         case Fold():
             lo, hi, start, body = parts
             return fold(term.variable, lo, hi, term.state, start, body)
@@ -346,7 +347,7 @@ def _in_scopes(term: Term, mapping: Mapping[str, Term], names: Mapping[str, str]
             return lam(tuple([enter(name) for name in term.params]), substitute(term.body, seen))
         case Sum():
             lo, hi = substitute(term.lo, seen), substitute(term.hi, seen)
-            return sum_(enter(term.variable), lo, hi, substitute(term.body, seen))
+            return sum_(enter(term.variable), lo, hi, substitute(term.body, seen), term.endless)
         case Fold():
             lo, hi, start = (substitute(part, seen) for part in (term.lo, term.hi, term.start))
             variable, state = enter(term.variable), enter(term.state)

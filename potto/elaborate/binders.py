@@ -32,7 +32,6 @@ from potto.core.terms import (
     proj,
     sub,
     substitute,
-    sum_,
     tuple_,
     var,
 )
@@ -138,7 +137,7 @@ def _integral_over(
         body = body if density is ONE else scaled(elaboration, density, body)
         if run[0][1].discrete:
             ((name, part),) = run
-            body = sum_(name, *part.counted, body)
+            body = part.summed(name, body, dims_of(elaboration, body))
         else:
             bounds, hints = tuple(part.support for _, part in run), tuple(part.hints for _, part in run)
             body = elaboration.note(integral_term(tuple(name for name, _ in run), bounds, body, hints), node.span)

@@ -26,12 +26,15 @@ from potto.core.terms import (
     const,
     div,
     fresh,
+    if_,
     integral,
     mul,
     neg,
     prim,
+    proj,
     sub,
     sum_,
+    tuple_,
     var,
 )
 from potto.measures.registry import MEASURES, Condition, Terms
@@ -56,9 +59,19 @@ class Component(Struct, frozen=True):
 
     @property
     def counted(self) -> tuple[Term, Term]:
-        """Of a discrete part, the first and the last number that a sum goes over."""
+        """Of a discrete part, the first number that a sum goes over, and the one that it goes to at least."""
         first, last = self.support
         return (first, last) if self.reach is None else (first, _end("min", last, self.reach(first), INF))
+
+    def summed(self, name: str, body: Term, dims: int | None = None) -> Term:
+        """Of a discrete part, the sum of what the body is for each number, as far as it matters. dims: the size of a
+        body that is a tuple."""
+        last = self.support[1]
+        if self.reach is not None and last is not INF:
+            inside = prim("le", var(name), last)
+            parts = [if_(inside, body if dims is None else proj(body, at), ZERO) for at in range(dims or 1)]
+            body = parts[0] if dims is None else tuple_(parts)
+        return sum_(name, *self.counted, body, self.reach is not None)
 
 
 class Composition(Struct, frozen=True):
@@ -212,7 +225,7 @@ def _mass(part: Component) -> Term:
     """By the integral or the sum, not as a difference of the cdf, which has no digits in the upper tail."""
     name = fresh("inside", part.support[0].free | part.support[1].free | part.density(ZERO).free)
     if part.discrete:
-        return sum_(name, *part.counted, part.density(var(name)))
+        return part.summed(name, part.density(var(name)))
     return integral((name,), (part.support,), part.density(var(name)), (part.hints,))
 
 

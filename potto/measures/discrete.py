@@ -1,8 +1,9 @@
 """Measures on whole numbers: bernoulli, binomial, poisson. An expectation is a sum of the terms in their support.
 
-Where there are infinitely many, the sum ends where what lies beyond it has a chance below 1e-20: for a Poisson
+Where there are infinitely many, the sum goes at least as far as where what lies beyond has a chance below 1e-20, and
+from there on as long as its terms matter: for a Poisson
 variable X with mean r, P(X >= r + t) <= exp(-t^2/(2 (r + t/3))) by Bennett's inequality, which is below exp(-46) for
-t = 10 sqrt(r) + 40. That is the truncation error, times what the body is there. From a number a > r on the chances fall
+t = 10 sqrt(r) + 40. From a number a > r on the chances fall
 at least as fast as those of mean a do, r^k/k! = (r/a)^k a^k/k!: a truncated tail reaches as far as for a mean of a.
 """
 
@@ -90,7 +91,7 @@ poisson = register(
             (prim("lt", r, INF), "the rate must be finite"),
         ),
         domain=((0.1, 50.0),),
-        doc="How many events happen in a unit of time, r on average; summed up to r + 10*sqrt(r) + 40.",
+        doc="How many events happen in a unit of time, r on average; summed up as far as its terms matter.",
         example="integral (k ~ poisson(3)) k^2 d(k)",
     )
 )

@@ -32,8 +32,9 @@ class Measure(Struct, frozen=True):
         depends on them. In ascending order.
     discrete: whether it is one of whole numbers: the support is the first and the last of them, the density the chance
         of each, and an expectation a sum.
-    reach: of a discrete measure with infinite support, from a number of it (before the parameters) where a sum that
-        begins there may end: what lies beyond has less than 1e-20 of the chance of what lies between.
+    reach: of a discrete measure with infinite support, from a number of it (before the parameters) how far a sum that
+        begins there goes at least: what lies beyond has less than 1e-20 of the chance of what lies between, and falls
+        faster than any geometric series.
     cdf: the integral of the density up to x; None if it is not a formula of builtins.
     quantile: the inverse of the cdf; None if it is not a formula of builtins.
     mean, variance: None where they do not exist.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from itertools import pairwise
 from typing import Any
 
 import pytest
@@ -58,6 +59,55 @@ def test_a_far_tail_of_poisson(r: float, first: int) -> None:
     with mp.workdps(40):
         chances = [poisson(k, mp.mpf(r)) for k in range(first, first + 300)]
         close(f(r), mp.fsum(k * p for k, p in enumerate(chances, first)) / mp.fsum(chances))
+
+
+GROWING: dict[str, tuple[str, Callable[[Any], Any]]] = {
+    "faster than the chances fall at first": ("poisson(t)) exp(3*k)", lambda t: mp.exp(t * mp.expm1(3))),
+    "with signs": ("poisson(t)) exp(2*k)*cos(pi*k/2)", lambda t: mp.re(mp.exp(t * (mp.exp(2 + mp.j * mp.pi / 2) - 1)))),
+    "nested": ("poisson(t), l ~ poisson(k + 1)) exp(k + l)", lambda t: mp.exp(mp.e - 1 + t * mp.expm1(mp.e))),
+    "with an end": (
+        "truncated(poisson(t), 0, 70)) exp(4*k)*sqrt(70 - k)",
+        lambda t: (
+            mp.fsum(poisson(k, t) * mp.exp(4 * k) * mp.sqrt(70 - k) for k in range(71))
+            / mp.fsum(poisson(k, t) for k in range(71))
+        ),
+    ),
+    "mixed": (
+        "mixture(1, poisson(t), 3, poisson(1))) exp(3*k)",
+        lambda t: (mp.exp(t * mp.expm1(3)) + 3 * mp.exp(mp.expm1(3))) / 4,
+    ),
+}
+
+
+@pytest.mark.parametrize("name", GROWING)
+def test_a_sum_goes_on_as_long_as_its_terms_matter(name: str) -> None:
+    program, exact = GROWING[name]
+    value, slope = potto.value_and_grad(
+        potto.compile(f"def f(t) integral (k ~ {program} d(k{', l' * (name == 'nested')})").f
+    )(0.7)
+    with mp.workdps(40):
+        wanted = exact(mp.mpf(0.7)), mp.diff(exact, mp.mpf(0.7))
+    for found, right in zip((value, slope), wanted, strict=True):
+        assert abs(found.value - right) <= found.error <= 1e-10 * abs(right)
+
+
+def test_what_goes_on_within_an_integrand() -> None:
+    """Beside conditions in the integrand, which cut where the chances are, and are nothing to the rest."""
+    f = potto.compile(
+        "def f(t) integral [0, 1] exp(-x)*(integral (k ~ poisson(1)) exp(3*k)*[x < t*k/30] d(k))^2 d(x)"
+    ).f
+    found, (ends, chances) = f(1.0), ([mp.mpf(min(k, 30)) / 30 for k in range(120)], [])
+    with mp.workdps(40):
+        chances = [mp.exp(3 * k) * poisson(k, mp.mpf(1)) for k in range(120)]
+        parts = [(a, b, mp.fsum(chances[k] for k in range(120) if ends[k] >= b)) for a, b in pairwise(ends)]
+        wanted = mp.fsum((mp.exp(-a) - mp.exp(-b)) * whole**2 for a, b, whole in parts)
+    assert abs(found.value - wanted) <= found.error <= 1e-12 * wanted
+
+
+def test_an_expectation_that_is_infinite() -> None:
+    found = potto.compile("def f(t) integral (k ~ poisson(t)) exp(k^2/10) d(k)").f(3.0)
+    assert not found.converged
+    assert found.error == math.inf
 
 
 def test_binomial() -> None:

@@ -39,6 +39,7 @@ from potto.core.terms import (
     transform,
     tuple_,
     with_integrand,
+    with_summand,
 )
 from potto.diagnostics import PottoError, declare
 from potto.source import Span
@@ -143,7 +144,7 @@ def _summed(node: Integral, item: Sum, wanted: Roots) -> list[Term]:
         raise NoClosedForm("how many deltas there are varies with a variable of integration")
     factor, rest = parts
     each = with_integrand(node, _times(factor, item.body))
-    whole = sum_(item.variable, item.lo, item.hi, without_deltas(each, wanted))
+    whole = with_summand(item, without_deltas(each, wanted))
     return [whole] if vanishes(rest) else [whole, with_integrand(node, rest)]
 
 

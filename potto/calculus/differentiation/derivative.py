@@ -52,10 +52,10 @@ from potto.core.terms import (
     rename_bound,
     sub,
     substitute,
-    sum_,
     tuple_,
     var,
     with_integrand,
+    with_summand,
 )
 from potto.primitives import PRIMITIVES
 
@@ -240,7 +240,7 @@ def _loop(node: Sum | Array, name: str) -> Term:
     if isinstance(apart, Array):
         return array(apart.variable, apart.size, partial(apart.body, name))
     assert isinstance(apart, Sum)
-    return sum_(apart.variable, apart.lo, apart.hi, partial(apart.body, name))
+    return with_summand(apart, partial(apart.body, name))
 
 
 def _fold(node: Fold, name: str, start: Term) -> Term:

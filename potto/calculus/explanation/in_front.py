@@ -9,7 +9,7 @@ from fractions import Fraction
 
 from potto.calculus.explanation.factors import Factors
 from potto.calculus.explanation.products import is_tangent, written
-from potto.core.terms import Const, Integral, Prim, Sum, Term, Var, postorder, sum_, with_integrand
+from potto.core.terms import Const, Integral, Prim, Sum, Term, Var, postorder, with_integrand, with_summand
 
 _EVERYWHERE = ("add", "mul", "neg", "sin", "cos", "atan", "tanh")  # no exp, which can be inf
 
@@ -30,7 +30,7 @@ def in_front(node: Integral | Sum, factors: Factors, tangents: frozenset[str]) -
         return node
     rest = {base: n for base, n in factors.powers.items() if base not in fixed}
     inner = written(Factors(Fraction(1), rest, factors.exponents, factors.conditions), tangents)
-    whole = with_integrand(node, inner) if isinstance(node, Integral) else sum_(node.variable, node.lo, node.hi, inner)
+    whole = with_integrand(node, inner) if isinstance(node, Integral) else with_summand(node, inner)
     return written(Factors(factors.coefficient, {whole: 1, **fixed}, [], []), tangents)
 
 

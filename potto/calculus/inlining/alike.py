@@ -128,7 +128,9 @@ def _head(node: Term, bound: Mapping[str, object]) -> object:
             return Branch, node.strict, below
         case Integral():
             return Integral, names, tuple(map(len, node.hints))
-        case Lam() | Sum() | Fold() | Array():
+        case Sum():
+            return Sum, names, node.endless
+        case Lam() | Fold() | Array():
             return type(node), names
         case Var():
             return Var, bound.get(node.name, node.name)

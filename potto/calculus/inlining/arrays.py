@@ -56,12 +56,13 @@ from potto.core.terms import (
     tuple_,
     var,
     with_integrand,
+    with_summand,
 )
 
 ARRAYS: tuple[type[Term], ...] = (Array, Index, Length, ListOf, Fold, Data)
 READS = (Index, Length, Proj)
 
-Loop = tuple[str, Term, Term]  # the index of a sum, from, to
+Loop = tuple[str, Term, Term, bool]  # the index of a sum, from, to, and whether it is endless
 Summand = tuple[tuple[Loop, ...], Term]
 
 
@@ -109,7 +110,7 @@ def _read(node: Term) -> Term:
         case Branch():
             return branch(whole.coordinates, whole.strict, _read_of(node, whole.then), _read_of(node, whole.orelse))
         case Sum() if not isinstance(node, Length):
-            return sum_(whole.variable, whole.lo, whole.hi, _read_of(node, whole.body))
+            return with_summand(whole, _read_of(node, whole.body))
         case Integral() if not isinstance(node, Length):
             return with_integrand(whole, _read_of(node, whole.body))
         case Array() if isinstance(node, Index):
@@ -167,8 +168,8 @@ def summands(term: Integral, look_ups: bool = True) -> Term:
 
 
 def _looped(loops: tuple[Loop, ...], term: Term) -> Term:
-    for name, lo, hi in reversed(loops):
-        term = sum_(name, lo, hi, term)
+    for name, lo, hi, endless in reversed(loops):
+        term = sum_(name, lo, hi, term, endless)
     return term
 
 
@@ -200,7 +201,7 @@ class _Linear:
             return [((), term)]
         match term:
             case Sum() if not self.varying.isdisjoint(term.body.free - {term.variable}) and self.goes_out(term):
-                own = (term.variable, term.lo, term.hi)
+                own = (term.variable, term.lo, term.hi, term.endless)
                 return [((own, *loops), part) for loops, part in self.parts(term.body) or [((), term.body)]]
             case Prim(op="add", args=args):
                 return [part for arg in args for part in self.parts(arg) or [((), arg)]]
@@ -227,7 +228,7 @@ class _Linear:
     def _integrated(self, term: Integral) -> list[Summand]:
         parts = self.parts(term.body)
         own = frozenset(term.variables)
-        if parts is None or any(own & (lo.free | hi.free) for loops, _ in parts for _, lo, hi in loops):
+        if parts is None or any(own & (lo.free | hi.free) for loops, _ in parts for _, lo, hi, _ in loops):
             return [((), term)]
         return [(loops, with_integrand(term, part)) for loops, part in parts]
 

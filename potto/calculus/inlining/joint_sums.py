@@ -22,9 +22,9 @@ from potto.core.terms import (
     outside,
     postorder,
     proj,
-    sum_,
     transform,
     tuple_,
+    with_summand,
 )
 
 # What is in these is evaluated in its own scope, or not at all.
@@ -33,17 +33,17 @@ APART = (Lam, Integral, Sum, Array, Fold, If, Branch)
 
 def with_joint_sums(term: Term) -> Term:
     """The term with its sums joined, those of their terms as well."""
-    ranges: dict[tuple[str, Term, Term], list[Sum]] = {}
+    ranges: dict[tuple[str, Term, Term, bool], list[Sum]] = {}
     for node in outside(term, APART):
         if isinstance(node, Sum) and middle(node) is None:
-            ranges.setdefault((node.variable, node.lo, node.hi), []).append(node)
+            ranges.setdefault((node.variable, node.lo, node.hi, node.endless), []).append(node)
     made: dict[Term, Term] = {}
-    for (name, lo, hi), sums in ranges.items():
+    for (name, *_), sums in ranges.items():
         for group in _sharing(sums, name):
             if len(group) == 1:
-                made[group[0]] = sum_(name, lo, hi, with_joint_sums(group[0].body))
+                made[group[0]] = with_summand(group[0], with_joint_sums(group[0].body))
                 continue
-            whole = sum_(name, lo, hi, with_joint_sums(tuple_(one.body for one in group)))
+            whole = with_summand(group[0], with_joint_sums(tuple_(one.body for one in group)))
             made |= {one: proj(whole, place) for place, one in enumerate(group)}
     return transform(
         term, lambda node, new: made.get(node, new), lambda node: () if isinstance(node, APART) else children(node)

@@ -33,6 +33,7 @@ from potto.core.terms import (
     proj,
     rebuild,
     substitute,
+    sum_,
 )
 
 DEEPEST = 150  # calls inside calls: Python's own stack holds four frames for each
@@ -118,7 +119,7 @@ class _Unrolling:
         if isinstance(node, App):
             return self.applied(node, depth)
         if isinstance(node, Sum) and (decides or any(isinstance(part, App | Branch) for part in postorder(node.body))):
-            return self.summed(node, depth)
+            return self.summed(node, depth, decides)
         if isinstance(node, Fold) and (decides or any(isinstance(part, App | Branch) for part in postorder(node.body))):
             return self.stepped(node, depth)
         return node
@@ -136,11 +137,15 @@ class _Unrolling:
 
         return self.calls.carried_out(call, function, groups, run)
 
-    def summed(self, node: Sum, depth: int) -> Term:
+    def summed(self, node: Sum, depth: int, decides: bool) -> Term:
+        """What an endless sum goes on with stays a sum, unless it decides: jumps there are next to nothing."""
         numbers = self.numbers(node)
         if numbers is None:
             return node
-        return add(*(self.run(substitute(node.body, {node.variable: const(k)}), depth + 1) for k in numbers))
+        terms = [self.run(substitute(node.body, {node.variable: const(k)}), depth + 1) for k in numbers]
+        if node.endless and not decides:
+            terms.append(sum_(node.variable, const(numbers.stop), const(numbers.stop - 1), node.body, True))
+        return add(*terms)
 
     def stepped(self, node: Fold, depth: int) -> Term:
         numbers, state = self.numbers(node), node.start

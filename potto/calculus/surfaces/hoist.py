@@ -24,9 +24,9 @@ from potto.core.terms import (
     integral,
     neg,
     postorder,
-    sum_,
     transform,
     with_integrand,
+    with_summand,
 )
 
 MOST = 6  # branches taken out of one integral: each doubles the integrals that there are
@@ -79,7 +79,7 @@ def _outside(term: Integral) -> Term:
         return term
     body, inside = term.body, _names(term)
     if isinstance(body, Sum) and body.variable not in term.free and not inside & (body.lo.free | body.hi.free):
-        return sum_(body.variable, body.lo, body.hi, _outside(with_integrand(term, body.body)))
+        return with_summand(body, _outside(with_integrand(term, body.body)))
     found = [
         node
         for node in reversed(postorder(term))

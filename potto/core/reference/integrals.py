@@ -332,6 +332,11 @@ def _zero_like(value: Value) -> Value:
     return type(value)(map(_zero_like, value)) if isinstance(value, tuple | list) else mp.mpf(0)
 
 
+def size(value: Value) -> Any:
+    """The largest number in a value, without its sign."""
+    return max(map(size, value), default=mp.mpf(0)) if isinstance(value, tuple | list) else abs(value)
+
+
 def plus(value: Value, others: list[Value]) -> Value:
     """The sum of numbers, or of tuples and arrays component by component."""
     for other in others:

@@ -51,6 +51,7 @@ Lookup = Callable[[str, str], Term]
 GUARD = 15  # digits beyond those asked for
 _NAMED = {"pi": lambda: +mp.pi, "inf": lambda: mp.inf}
 _DEEP = 60_000
+_SETTLED = 8  # terms in a row after whose like an endless sum ends
 
 
 def evaluate(
@@ -195,6 +196,10 @@ class Walk:
     def sum(self, term: Sum, env: Environment) -> Value:
         lo, hi = int(mp.ceil(self.run(term.lo, env))), int(mp.floor(self.run(term.hi, env)))
         parts = [self.run(term.body, {**env, term.variable: mp.mpf(i)}) for i in range(lo, hi + 1)]
+        sizes = [integrals.size(part) for part in parts] if term.endless else [mp.mpf(0)]
+        while any(size > mp.eps * max(sizes) for size in sizes[-_SETTLED:]):
+            parts.append(self.run(term.body, {**env, term.variable: mp.mpf(lo + len(parts))}))
+            sizes.append(integrals.size(parts[-1]))
         return integrals.plus(parts[0], parts[1:]) if parts else mp.mpf(0)
 
     def fold(self, term: Fold, env: Environment) -> Value:

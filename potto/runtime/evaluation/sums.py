@@ -7,18 +7,18 @@ chunks; of those that are in proportion to a tent only the few that are not 0.
 from __future__ import annotations
 
 import operator
-from typing import Any
 
 import numpy as np
 
 from potto.calculus.inlining.lattices import REACH, middle
-from potto.core.terms import Sum, Tuple, lam
+from potto.core.terms import Lam, Sum, Tuple, lam
 from potto.diagnostics import PottoError
 from potto.kernels import errors
 from potto.kernels.cells import Cell, Number, Rows, Trace, Value, batch_shape, combined, listed, map_arrays, map_cells
 from potto.kernels.tape import Node
 from potto.kernels.whole import LARGEST, PAIRWISE, ROUNDING, SHORT, looked_through
-from potto.runtime.answers.allowances import NOTHING
+from potto.runtime.answers.allowances import NOTHING, Allowance
+from potto.runtime.evaluation.endless import Extent
 from potto.runtime.evaluation.machine import Machine
 from potto.runtime.evaluation.selection import by_bounds
 
@@ -30,42 +30,58 @@ def total(machine: Machine, term: Sum, lo: Value, hi: Value, env: dict[str, Valu
     first, last = bounds(lo, "lower"), bounds(hi, "upper")
     if isinstance(first, np.ndarray) or isinstance(last, np.ndarray):
         return by_bounds(first, last, env, lambda lo, hi, here: total(machine, term, lo, hi, here, None))
-    if last < first:
+    if last < first and not term.endless:
         return tuple(Cell(0.0) for _ in term.body.items) if isinstance(term.body, Tuple) else Cell(0.0)
     if last - first >= MOST_TERMS:
         raise PottoError([errors.BAD_SUM(errors.NOWHERE, f"a sum of {last - first + 1:.16g} terms is too long")])
-    params = tuple(sorted(term.body.free | {term.variable}))
-    body = lam(params, term.body)
     if trace:
-        return _one_by_one(machine, term, body, int(first), int(last), env, trace)
-    shape = batch_shape(env.values())
-    wide = {n: map_arrays(v, lambda a: a[..., None]) for n, v in env.items()}
+        return _one_by_one(machine, term, int(first), int(last), env, trace)
     if last - first >= REACH and (place := middle(term)) is not None:
+        body, wide = _body(term), _with_axis(env)
         here = {n: map_cells(wide[n], lambda cell: Cell(cell.v)) for n in place.free}
         wide[term.variable] = _around(machine, machine.with_directions(0).term(place, here), int(first), int(last))
-        return _reduce(machine.run(body, [wide[p] for p in params], None), shape, REACH)
-    integrates = machine.linker.inexact(term.body)
-    if integrates:
-        found = machine.semantics.culled(machine, term, int(first), int(last), env)
+        return _reduce(machine.run(body, [wide[p] for p in body.params], None), batch_shape(env.values()), REACH)
+    return _batched(machine, term, int(first), int(last), env)
+
+
+def _batched(machine: Machine, term: Sum, first: int, last: int, env: dict[str, Value]) -> Value:
+    """All terms in one go, in chunks."""
+    integrates, shape = machine.linker.inexact(term.body), batch_shape(env.values())
+    if integrates and not term.endless:
+        found = machine.semantics.culled(machine, term, first, last, env)
         if found is not None:
             return found
+    body, wide = _body(term), _with_axis(env)
     step = max(1, CHUNK // max(1, int(np.prod(shape))))
     machine = machine if shape else machine.changed(summed=True)
     record, result = machine.record, None
     met, allowed = record.met, record.allowed
-    for start in range(int(first), int(last) + 1, step):
-        index = np.arange(start, min(start + step, int(last) + 1), dtype=float)
+    extent = Extent(first, last, step, term.endless)
+    for index in extent:
         wide[term.variable] = Cell(index, None, (None,) * machine.directions)
         record.allowed = NOTHING
         with looked_through(0 if integrates else SHORT):
-            value = machine.run(body, [wide[p] for p in params], None)
+            value = machine.run(body, [wide[p] for p in body.params], None)
         allowed = allowed.and_of(record.allowed.added(shape, index.size))
+        extent.saw(value, index.size)
         part = _reduce(value, shape, index.size)
         result = part if result is None else plus(result, part)
     record.allowed = allowed
     record.spread(met)
     assert result is not None
-    return result
+    if term.endless and not np.all(finite := extent.finite):
+        record.methods.add("sum")  # it says why there is no number, as an integral does
+        record.allowed = allowed.and_of(Allowance(np.zeros_like(finite, dtype=float), finite, finite))
+    return extent.with_rest(result)
+
+
+def _body(term: Sum) -> Lam:
+    return lam(tuple(sorted(term.body.free | {term.variable})), term.body)
+
+
+def _with_axis(env: dict[str, Value]) -> dict[str, Value]:
+    """The same with a last axis, for the terms."""
+    return {n: map_arrays(v, lambda a: a[..., None]) for n, v in env.items()}
 
 
 def _around(machine: Machine, place: Value, first: int, last: int) -> Cell:
@@ -91,15 +107,14 @@ def bounds(value: Value, which: str) -> Number:
     return value.v
 
 
-def _one_by_one(
-    machine: Machine, term: Sum, body: Any, first: int, last: int, env: dict[str, Value], trace: Trace
-) -> Value:
+def _one_by_one(machine: Machine, term: Sum, first: int, last: int, env: dict[str, Value], trace: Trace) -> Value:
+    body = _body(term)
     result: Value = Cell(0.0)
     for number, index in enumerate(range(first, last + 1)):
         here = {**env, term.variable: Cell(float(index), None, (None,) * machine.directions)}
         value = machine.run(body, [here[p] for p in body.params], trace.get(number))
         result = value if number == 0 else plus(result, value)
-    return result
+    return plus(result, _batched(machine, term, last + 1, last, env)) if term.endless else result
 
 
 def _reduce(value: Value, shape: tuple[int, ...], count: int) -> Value:

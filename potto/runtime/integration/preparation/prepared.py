@@ -47,11 +47,11 @@ from potto.core.terms import (
     postorder,
     rebuild,
     substitute,
-    sum_,
     transform,
     tuple_,
     var,
     with_integrand,
+    with_summand,
 )
 from potto.diagnostics import PottoError
 from potto.kernels import errors
@@ -87,7 +87,7 @@ def prepared(term: Integral, reach: Reach) -> Term:
         return outside
     body = term.body
     if isinstance(body, Sum) and not (body.lo.free | body.hi.free) & set(term.variables):
-        return sum_(body.variable, body.lo, body.hi, with_integrand(term, body.body))
+        return with_summand(body, with_integrand(term, body.body))
     if isinstance(body, Prim) and body.op in ("neg", "mul", "div"):
         varying = [arg for arg in body.args if arg.free.intersection(term.variables)]
         if len(varying) > 1 and (parts := _multiplied_out(term, body, reach)):
