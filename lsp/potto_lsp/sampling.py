@@ -17,6 +17,7 @@ from potto.projects.settings import settings
 from potto.python.api import Module, expression
 from potto.python.functions import Function
 from potto.python.gradients import grad
+from potto.python.tiles import growing
 from potto.runtime.answers.estimate import Estimate
 
 if TYPE_CHECKING:
@@ -44,7 +45,7 @@ def sample(
         raise NoSamples(f"`{name}` is not a function")
     places, shape = _places(axes)
     given = {key: argument(module, key, value) for key, value in values.items() if key not in places} | places
-    with settings(rtol=rtol or RTOL):
+    with settings(rtol=rtol or RTOL), growing():
         try:
             estimate = function(**given) if wrt is None else grad(function, [wrt])(**given)
         except (PottoError, TypeError) as error:

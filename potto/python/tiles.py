@@ -15,7 +15,8 @@ import os
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, wait
-from contextlib import nullcontext
+from contextlib import contextmanager, nullcontext
+from contextvars import ContextVar
 from functools import cache
 from itertools import groupby, pairwise
 from typing import Any, Protocol
@@ -55,6 +56,7 @@ TILE = 0.5  # seconds of a tile by the clock, at the most
 SHARES = 4  # tiles a worker gets at least, where there are enough blocks: who is done first takes more
 WORTH = 0.3  # seconds of work from which on others are asked to help; executors may say otherwise, by `worth`
 TRIES = 2  # of an executor at a tile
+SMOOTH = 0.5  # seconds that a whole batch may take in blocks twice as large next time, where blocks may grow
 MOST_SIZES = 4096
 
 Part = tuple[int, int]  # members first..stop-1
@@ -143,12 +145,24 @@ def in_tiles(
 
 # Of blocks, for functions called before, and whether larger ones would take too long; else the batch was small.
 _sizes: dict[Any, tuple[int, bool]] = {}
+_growing: ContextVar[bool] = ContextVar("_growing", default=False)
+
+
+@contextmanager
+def growing() -> Iterator[None]:
+    """Within this, what was short in blocks is asked in larger ones next time: their size was found out when everything
+    was new. For who asks the same again and again, and needs no last bit of an answer: frames of a preview."""
+    before = _growing.set(True)
+    try:
+        yield
+    finally:
+        _growing.reset(before)
 
 
 class _Tiles(Struct):
     """One batch. key: for whom the size of blocks is kept. done: the answers so far, by the first member of their
     block. tried: those of blocks that only told the size, with that member. again: how many blocks were lost. spent:
-    seconds that the last block took that was evaluated here."""
+    seconds that the last block took that was evaluated here; total: all of them."""
 
     count: int
     here: Callable[[Part], Estimate]
@@ -159,6 +173,7 @@ class _Tiles(Struct):
     blocks: list[Part] = field(default_factory=list)
     again: int = 0
     spent: float = 0.0
+    total: float = 0.0
     start: float = field(default_factory=time.perf_counter)
 
     def run(self, pool: Executor | None) -> Estimate:
@@ -183,6 +198,8 @@ class _Tiles(Struct):
             rest = self.blocks[number + 1 :]
             if pool is not None and self.spent * len(rest) > getattr(pool, "worth", WORTH):
                 return self._shared(pool, rest, told)
+        if _growing.get() and len(self.blocks) > 1 and self.total <= SMOOTH:
+            _sizes[self.key] = 2 * size, True
         return None
 
     def _size(self) -> int:
@@ -268,6 +285,7 @@ class _Tiles(Struct):
         start, made = time.thread_time(), making.worked
         found = self.done[block[0]] = self.here(block)
         self.spent = time.thread_time() - start - (making.worked - made)
+        self.total += self.spent
         return found
 
     def _shared(self, pool: Executor, rest: list[Part], told: Callable[[float, int], None]) -> None:

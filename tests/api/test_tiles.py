@@ -15,6 +15,7 @@ from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPool
 from contextlib import contextmanager
 from multiprocessing import get_context
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -243,6 +244,21 @@ def test_the_first_block_is_asked_again_however_long_it_takes(monkeypatch: pytes
         monkeypatch.setattr(tiles, name, seconds)
     first = iter([5.0])
     assert size_by(monkeypatch, 25600, lambda members: 0.13 + 0.00025 * members + next(first, 0.0)) == 4096
+
+
+def test_blocks_grow_from_frame_to_frame_of_a_preview_and_for_nobody_else(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The first frame finds everything new, so that 64 members seem to take long."""
+    monkeypatch.setattr(tiles, "ENOUGH", 0.1)
+    monkeypatch.setattr(tiles, "_sizes", {"frame": (64, True)})
+
+    def frame() -> int:
+        one = tiles._Tiles(1024, lambda part: SimpleNamespace(evals=0), lambda parts: None, "frame")  # type: ignore
+        one._all(None, lambda part, evals: None)
+        return len(one.blocks)
+
+    assert [frame() for _ in range(2)] == [16, 16]
+    with tiles.growing():
+        assert [frame() for _ in range(5)] == [16, 8, 4, 2, 1]
 
 
 def test_blocks_are_timed_without_what_is_made_for_them() -> None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Iterable, Sequence
+from functools import cache
 
 import numpy as np
 
@@ -62,7 +63,7 @@ def led_to(found: Sequence[Parts], here: tuple[Array, Array], step: float) -> tu
     """What three steps towards the parameters, of which `step` is the last, lead to, and how far off that may be."""
     slopes = [np.where(np.isfinite(et), t, np.nan) for _, _, t, et in found]
     noise = np.sum([et for *_, et in found], axis=0)
-    flat = zip(*(x.ravel() for x in (*slopes, noise)), strict=True)
+    flat = zip(*(x.ravel().tolist() for x in (*slopes, noise)), strict=True)
     limits, missed = (np.reshape(x, noise.shape) for x in zip(*(_limit(*four) for four in flat), strict=True))
     v, e, *_ = found[-1]
     # Nearer by rounding is no less, even where nothing shows: sin(x*t)/t is x just beside t = 0, to the last digit.
@@ -116,6 +117,7 @@ def _smooth(
     cancelled = [np.finfo(float).eps * np.abs(v) / h**2 for h, (v, *_) in zip(places, found, strict=True)]
     noise = np.array([et + np.where(known, 0.0, more) for more, (*_, et) in zip(cancelled, found, strict=True)])
 
+    @cache  # each row is asked for by itself, and as the longer ones without an end
     def through(power: float, first: int, end: int) -> tuple[Array, Array]:
         near = np.abs(places[first:end]) ** power
         weights = np.array([np.prod([h / (h - own) for h in near if h != own]) for own in near])
@@ -144,7 +146,7 @@ def _smooth(
 def _limit(far: float, nearer: float, nearest: float, noise: float) -> tuple[float, float]:
     """Where three values at steps that shrink lead to, a number, an infinity, or nan where that does not show, and how
     far off it may be: what is still to come, or what extrapolation may have missed of it."""
-    if not np.isfinite([far, nearer, nearest]).all():
+    if not (math.isfinite(far) and math.isfinite(nearer) and math.isfinite(nearest)):
         return math.nan, 0.0
     first, second = nearer - far, nearest - nearer
     rate = min(max(abs(second / first), CLOSER), SETTLING) if first else CLOSER
