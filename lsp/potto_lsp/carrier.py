@@ -1,7 +1,8 @@
 """pygls, where it is strict enough, and what is done here in its place. Owns `Protocol` and `StreamServer`.
 
 Taken from pygls: the server and its table of handlers, the way from a message to its handler, answers as futures and
-their cancellation, requests and notifications to the client, the codes of errors. Of pygls 2.1.1 does not hold:
+their cancellation, requests and notifications to the client, the codes of errors; and its client, with which tests talk
+on streams and on a socket. Of pygls 2.1.1 does not hold:
 
 - `io_.run` knows `Content-Length: n` in exactly that form, answers nothing to what is not JSON and takes a body that
   ends early for a message: `StreamServer.carry` is given what `wire.messages` reads.
@@ -16,6 +17,8 @@ their cancellation, requests and notifications to the client, the codes of error
 - What a synchronous handler returns is its answer at once, so that it cannot be cancelled: a handler may return a
   future here. `set_result` on a future that was cancelled meanwhile raises: see `settle`.
 - A handler's failure is sent with a traceback, one of the protocol without its data, and both as objects of attrs.
+- `Progress` wants a `LanguageServerProtocol` with its classes, and shows what is over in a moment: see `progress`.
+- `uris` has no path for what is on no disk, and two for a file that a client writes in two ways: see `uris`.
 - `_send_data` waits for a client that does not read, writes every message into the log, sends `params: null`, takes
   results apart object by object, and keeps what it cannot send to itself: `wire.Outbox` writes.
 """
