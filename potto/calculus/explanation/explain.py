@@ -66,7 +66,8 @@ from potto.types import Type, derivative_type, format_type, groups_of, interface
 
 @query
 def explain_derivative(db: Database, file: str, name: str) -> DerivativeText:
-    """The derivative of a definition, in symbols. What is a derivative itself is explained by what it is one of."""
+    """The derivative of a definition, in symbols. What is a derivative itself is explained by what it is one of. Of a
+    definition that an error spoils, itself or by what it needs, the symbols mean nothing: that is asked first."""
 
     def resolve(target: Global) -> Term:
         return core_term(db, target.module, target.name)
