@@ -67,6 +67,7 @@ from potto.core.kinds import with_integrand as with_integrand
 from potto.core.kinds import with_summand as with_summand
 from potto.core.rebuilding import rebuilt as rebuilt
 from potto.core.walking import Holding as Holding
+from potto.core.walking import Told as Told
 from potto.core.walking import bound_apart as bound_apart
 from potto.core.walking import bound_names as bound_names
 from potto.core.walking import children as children

@@ -214,18 +214,31 @@ class Kept(Generic[Found]):
         return self.found
 
 
-class Holding:
-    """Whether terms have parts of some kinds. What was looked through once is not looked through again."""
+class Told(Generic[Found]):
+    """What is told of a term by what is told of its parts. What was looked through once is not looked through again.
+
+    tell: of a term, and what was told of each of the parts that are below it.
+    """
+
+    def __init__(
+        self, tell: Callable[[Term, list[Found]], Found], below: Callable[[Term], Sequence[Term]] = children
+    ) -> None:
+        self.tell = tell
+        self.below = below
+        self.known: Kept[Found] = Kept(65536)
+
+    def __call__(self, term: Term) -> Found:
+        known = self.known.table()
+        for node in unknown(term, known, self.below):
+            known[node] = self.tell(node, [known[part] for part in self.below(node)])
+        return known[term]
+
+
+class Holding(Told[bool]):
+    """Whether terms have parts of some kinds."""
 
     def __init__(self, *kinds: type[Term]) -> None:
-        self.kinds = kinds
-        self.known: Kept[bool] = Kept(65536)
-
-    def __call__(self, term: Term) -> bool:
-        known = self.known.table()
-        for node in unknown(term, known):
-            known[node] = type(node) in self.kinds or any(map(known.__getitem__, children(node)))
-        return known[term]
+        super().__init__(lambda node, parts: type(node) in kinds or any(parts))
 
 
 def outside(root: Term, binders: tuple[type[Term], ...]) -> Iterator[Term]:

@@ -92,10 +92,10 @@ class Outlines:
 
 def outlined(
     term: Integral, found: Sequence[Finding], hides: bool, resolve: Resolve, over: LevelSet | None,
-    findings: Callable[[Term], Iterable[Finding]], mixed: Iterable[Term],
+    findings: Callable[[Term], Iterable[Finding]], mixed: Iterable[Finding],
 ) -> Outline:  # fmt: skip
-    """The outline of an integral whose integrand has these surfaces; `findings` gives those of a bound. mixed: surfaces
-    with conditions inside, as they were written: these may be decided in what is integrated."""
+    """The outline of an integral whose integrand has these surfaces; `findings` gives those of a bound. mixed: those
+    of surfaces with conditions inside, as they were written: these may be decided in what is integrated."""
 
     def holds(paths: Paths) -> Mapping[Term, int]:
         return held(vanishing_of(term.body, paths, resolve=resolve))
@@ -119,7 +119,7 @@ def outlined(
 
 
 def _kinks(
-    term: Integral, found: Iterable[Finding], findings: Callable[[Term], Iterable[Finding]], mixed: Iterable[Term]
+    term: Integral, found: Iterable[Finding], findings: Callable[[Term], Iterable[Finding]], mixed: Iterable[Finding]
 ) -> tuple[Lam, int]:
     """Where an integrand, and what it is integrated over, have kinks that may lie along a stretch, and how many of
     these are steps of parameters alone, those within surfaces counted."""
@@ -127,9 +127,8 @@ def _kinks(
     inside = (*found, *(f for pair in term.bounds for bound in pair for f in findings(bound)))
     kinks = dict.fromkeys(f.surface for f in inside if f.kind == "kink")
     lying = tuple(k for k in kinks if not any(monotone(k, v, box) for v in term.variables))
-    within = (f for surface in mixed for f in findings(surface))
     jumps = dict.fromkeys(
-        f.surface for f in (*inside, *within) if f.kind in ("jump", "step") and not f.surface.free & names
+        f.surface for f in (*inside, *mixed) if f.kind in ("jump", "step") and not f.surface.free & names
     )
     steps = tuple(step for step in jumps if step not in kinks)
     return function_of(tuple_((*lying, *steps))), len(steps)

@@ -20,7 +20,7 @@ from potto.calculus.decomposition.surface_cuts import along
 from potto.calculus.differentiation.level_sets import LevelSet, placed_along
 from potto.calculus.inlining.expand import expanded
 from potto.calculus.inlining.unrolled import loops_unrolled, unrolled
-from potto.calculus.surfaces.discontinuities import findings
+from potto.calculus.surfaces.discontinuities import findings, surfaces_below
 from potto.calculus.surfaces.finding import Decide, Finding, Resolve
 from potto.calculus.surfaces.hoist import hidden, hoisted, split_at_bounds
 from potto.calculus.surfaces.lifted import Lifted, lifted
@@ -252,6 +252,10 @@ class _Asked:
         self.unknown.clear()
         return findings(term, self.known, self.remember)
 
+    def below(self, terms: Iterable[Term]) -> tuple[Finding, ...]:
+        """What these jump at, and where they bend, also within what they call."""
+        return surfaces_below(terms, self.known, self.remember)
+
 
 def make(
     term: Integral, resolve: Resolve, decide: Decide, inline: Resolve, number: Number, outlines: Outlines
@@ -313,7 +317,7 @@ def _outlined(
         found = asked.findings(term.body)
         hides = hidden(term, found, asked.resolve)
     reaches = not asked.unknown
-    outline = outlined(term, found, hides, asked.resolve, over, asked.findings, several)
+    outline = outlined(term, found, hides, asked.resolve, over, asked.findings, asked.below(several))
     if term is whole and asked.times == times and reaches and over is None and not mixed:
         outlines.put(found, outline)
     return outline, reaches, premises, confused

@@ -1,4 +1,5 @@
-"""A chain of definitions is checked at a cost that grows with its text: what one call leads to is carried out once."""
+"""A chain of definitions costs what grows with its text, to check and at its first call: what one call leads to is
+carried out once, however deep it is."""
 
 from __future__ import annotations
 
@@ -30,3 +31,13 @@ def test_twice_as_long_a_chain_takes_about_twice_as_long_to_check(kind: str) -> 
     calls(chain(kind, 3))
     few, many = calls(chain(kind, 24)), calls(chain(kind, 48))
     assert many <= 2.6 * few  # the text is 2.1 times as long
+
+
+def test_twice_as_long_a_chain_takes_about_twice_as_long_to_call() -> None:
+    def first(n: int) -> int:
+        program = potto.compile(chain("a state", n))
+        return calls_in(lambda: program.g(0.5))
+
+    first(3)
+    few, many = first(40), first(80)
+    assert many <= 2.3 * few

@@ -76,7 +76,7 @@ def swapped_under(conditions: int, looked_at: Callable[[], int]) -> int:
 
 
 def test_where_surfaces_are_defined_is_found_once_for_all_shaders() -> None:
-    assert swapped_under(23, lambda: ends_of_domain.cache_info().misses) == 0
+    assert swapped_under(23, lambda: len(ends_of_domain.known.found)) == 0
 
 
 def test_what_holds_no_call_is_not_rebuilt_for_another_shader(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -19,7 +19,7 @@ from msgspec import Struct
 from potto.calculus.algebra.point_values import sample_value
 from potto.calculus.differentiation.loops import parts_below
 from potto.calculus.inlining.currying import arguments_of, groups_of, sizes_of, uncurry
-from potto.calculus.inlining.expand import DEEPEST, Expansion, Resolve, expanded
+from potto.calculus.inlining.expand import MOST_NAMES, Expansion, Resolve, expanded
 from potto.calculus.surfaces.trace import spine
 from potto.core.terms import (
     ONE,
@@ -266,7 +266,7 @@ class _Walk:
         name, path = UNNAMED, place.path
         function: Term | None = head
         if isinstance(head, Global):
-            if path.count(head) >= _TWICE or len(path) >= DEEPEST:
+            if path.count(head) >= _TWICE:
                 return
             name, path = head.name, (*path, head)
             function, further = self.followed(head)
@@ -292,7 +292,7 @@ class _Walk:
     def followed(self, name: Global) -> tuple[Term | None, int]:
         """The skeleton that a name leads to through other names, and how many derivatives are taken on the way."""
         found, order = self.skeletons(name), 0
-        for _ in range(DEEPEST):
+        for _ in range(MOST_NAMES):
             if isinstance(found, Deriv):
                 found, order = found.function, order + 1
             elif isinstance(found, Global):

@@ -1,11 +1,14 @@
 """Calls carried out: a term in which known functions are replaced by what they do.
 
-Owns `expanded`, `holds_call`, `Expansion`, `Calls`, `known_function`, `named` and `heads_of`.
+Owns `expanded`, `holds_call`, `Expansion`, `Calls`, `known_function`, `named` and `heads_of`. Calls inside calls are
+gone into on a stack of their own (`Step`, `driven`), so that no number of them is too deep.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections import Counter
+from collections.abc import Callable, Generator
+from functools import partial
 from itertools import chain
 
 from potto.calculus.inlining.currying import arguments_of, sizes_of, uncurry
@@ -39,6 +42,7 @@ from potto.core.terms import (
     substitute,
     transform,
     tuple_,
+    unknown,
     var,
 )
 
@@ -48,9 +52,10 @@ Resolve = Callable[[Global], "Term | None"]
 Derive = Callable[[Lam], Lam]
 
 Groups = tuple[tuple[Term, ...], ...]
+# What gives a term once those that it yields have given theirs, which it is sent.
+Step = Generator["Step", Term, Term]
 
 MOST_ITEMS = 64  # functions in an array that are looked at one by one
-DEEPEST = 60  # calls inside calls
 MOST_NAMES = 100  # that a definition may lead through
 
 
@@ -70,15 +75,28 @@ def expanded(term: Term, resolve: Resolve, derive: Derive | None = None, rounds:
     return Expansion(resolve, derive, rounds).of(term)
 
 
+def driven(step: Step) -> Term:
+    """What a step gives in the end: recursion, on a stack that has no end."""
+    waiting: list[Step] = [step]
+    given: Term | None = None
+    while waiting:
+        try:
+            waiting.append(waiting[-1].send(given) if given is not None else next(waiting[-1]))
+            given = None
+        except StopIteration as end:
+            waiting.pop()
+            given = end.value
+    assert given is not None
+    return given
+
+
 class Calls:
     """Calls that were carried out, each with the same arguments once."""
 
     def __init__(self) -> None:
         self.known: dict[tuple[Lam, tuple[Term, ...]], Term] = {}
 
-    def carried_out(
-        self, call: App, function: Lam, groups: tuple[tuple[Term, ...], ...], run: Callable[[Term], Term]
-    ) -> Term:
+    def carried_out(self, call: App, function: Lam, groups: Groups, run: Callable[[Term], Step]) -> Step:
         """What `run` makes of the function's body with the arguments in it; the call, if they don't fit."""
         params, body = uncurry(function, sizes_of(groups))
         args = arguments_of(function, groups)
@@ -86,15 +104,16 @@ class Calls:
             return call
         key = (function, args)
         if key not in self.known:
-            self.known[key] = run(substitute(body, dict(zip(params, args, strict=True))))
+            self.known[key] = yield run(substitute(body, dict(zip(params, args, strict=True))))
         return self.known[key]
 
 
 class Expansion:
     """Calls carried out in one term or several, each call with the same arguments once.
 
-    A call of a definition inside itself stays a call after some rounds: how deep it goes is decided by values. Binders
-    that get inside of each other have names of their own.
+    A call of a definition inside itself stays a call after some rounds: how deep it goes is decided by values. What
+    such calls lead to is forgotten between terms, since it depends on where they stand. Binders that get inside of each
+    other have names of their own.
     """
 
     def __init__(self, resolve: Resolve, derive: Derive | None = None, rounds: int = 1) -> None:
@@ -102,44 +121,61 @@ class Expansion:
         self.derive = derive
         self.rounds = rounds
         self.calls = Calls()
+        self.within = Counter[Term]()  # the functions that are being carried out
+        self.left = False  # whether a call was, for its rounds
+        self.made: dict[Term, Term] = {}  # what terms are with all calls in them carried out
         self.bound: Bound = {}
 
     def of(self, term: Term) -> Term:
-        return apart(self.run(term, ()), self.bound)
+        whole = driven(self.run(term))
+        if self.left:
+            self.calls, self.made, self.left = Calls(), {}, False
+        return apart(whole, self.bound)
 
-    def run(self, term: Term, path: tuple[Term, ...]) -> Term:
+    def run(self, term: Term) -> Step:
         if not holds_call(term):
             return term
-        memo: dict[Term, Term] = {}
-        for node in postorder(term, below=_below_calls):
+        made, order = self.made, unknown(term, self.made, _below_calls)
+        for node in order:
             if not holds_call(node):
-                memo[node] = node
-                continue
-            if isinstance(node, Proj):
-                memo[node] = proj(memo[node.term], node.index)
-                continue
-            new = rebuild(node, tuple(memo[c] for c in children(node)))
-            memo[node] = self.applied(new, path) if isinstance(new, App) else new
-        return memo[term]
+                made[node] = node
+            elif isinstance(node, Proj):
+                made[node] = proj(made[node.term], node.index)
+            else:
+                new = rebuild(node, tuple([made[c] for c in children(node)]))
+                made[node] = (yield self.applied(new)) if isinstance(new, App) else new
+        found = made[term]
+        if self.left:  # elsewhere the same may be carried out
+            for node in order:
+                del made[node]
+        return found
 
-    def applied(self, call: App, path: tuple[Term, ...]) -> Term:
+    def inside(self, named: Term, term: Term) -> Step:
+        """What is carried out within a function."""
+        self.within[named] += 1
+        found = yield self.run(term)
+        self.within[named] -= 1
+        return found
+
+    def applied(self, call: App) -> Step:
         head, groups = spine(call)
         named = head
         while isinstance(named, Deriv):
             named = named.function
-        if path.count(named) >= self.rounds or len(path) > DEEPEST:
+        if self.within[named] >= self.rounds:
+            self.left = True
             return call
         if isinstance(head, Deriv):
             spelled = tuple([tuple(map(self.spelled, group)) for group in groups])
             if any(isinstance(arg, Array) and _has_functions(arg.body) for arg in chain.from_iterable(spelled)):
                 return call  # until it is known which functions there are
             if any(map(_has_functions, chain.from_iterable(spelled))):
-                head, groups = self.in_parts(head, spelled, (*path, named))
+                head, groups = yield from self.in_parts(head, spelled, named)
         function = known_function(head, self.resolve, self.derive)
         if function is None:
             return call
-        inner = (*path, named) if isinstance(named, Global) else path
-        return self.calls.carried_out(call, function, groups, lambda body: self.run(body, inner))
+        run = partial(self.inside, named) if isinstance(named, Global) else self.run
+        return (yield self.calls.carried_out(call, function, groups, run))
 
     def spelled(self, arg: Term) -> Term:
         """An array of what is made of functions, element by element, where it is known which they are."""
@@ -154,7 +190,7 @@ class Expansion:
         found = named(name, self.resolve)
         return found if isinstance(found, ListOf) else name
 
-    def in_parts(self, head: Deriv, groups: Groups, path: tuple[Term, ...]) -> tuple[Term, Groups]:
+    def in_parts(self, head: Deriv, groups: Groups, named: Term) -> Generator[Step, Term, tuple[Term, Groups]]:
         """The derivative of a function of the parts of those arguments in which there are functions, and these parts:
         duals stand side by side in them, and a parameter that is called is seen to be a function, also where it is
         handed on."""
@@ -171,7 +207,7 @@ class Expansion:
         opened = transform(substitute(body, whole), _part_by_part)
         functions = {name for name, arg in parts if _has_functions(arg)}
         if _hands_on(opened, functions):
-            opened = self.run(opened, path)
+            opened = yield self.inside(named, opened)
         return deriv(lam(names, opened)), (given,)
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from potto.calculus.inlining.expand import Calls
+from potto.calculus.inlining.expand import Calls, Step, driven
 from potto.calculus.surfaces.finding import Decide, Resolve
 from potto.calculus.surfaces.trace import spine
 from potto.core.binders import apart
@@ -36,7 +36,6 @@ from potto.core.terms import (
     sum_,
 )
 
-DEEPEST = 150  # calls inside calls: Python's own stack holds four frames for each
 MOST_CALLS = 5000
 MOST_SUMMANDS = 256  # where it is not known yet what becomes of them
 MOST_STEPS = 1000  # of a loop that is written out to be integrated
@@ -54,7 +53,7 @@ def unrolled(term: Term, resolve: Resolve, decide: Decide, most: int = MOST_SUMM
     `resolve` gives the functions that a call may be replaced by; others stay calls. most: steps of a loop.
     """
     try:
-        return apart(_Unrolling(resolve, decide, most).run(term, 0))
+        return apart(driven(_Unrolling(resolve, decide, most).run(term)))
     except _TooMuch:
         return None
 
@@ -79,8 +78,9 @@ class _Unrolling:
         self.decide = decide
         self.most = most
         self.calls = Calls()
+        self.begun = 0
 
-    def run(self, term: Term, depth: int) -> Term:
+    def run(self, term: Term) -> Step:
         taken: dict[Term, Term] = {}  # plain conditionals, and the sides that they take
         memo: dict[Term, Term] = {}
         deciding = {
@@ -99,7 +99,7 @@ class _Unrolling:
                 memo[node] = proj(memo[node.term], node.index)
             else:
                 new = rebuild(node, tuple(memo[c] for c in children(node)))
-                memo[node] = self.carried_out(new, depth, node in deciding)
+                memo[node] = (yield step) if (step := self.carried_out(new, node in deciding)) else new
         return memo[term]
 
     def below(self, node: Term, taken: dict[Term, Term]) -> Sequence[Term]:
@@ -113,46 +113,49 @@ class _Unrolling:
                 return (taken[node],)
         return children(node)
 
-    def carried_out(self, node: Term, depth: int, decides: bool) -> Term:
+    def carried_out(self, node: Term, decides: bool) -> Step | None:
         """A call as what it does, a sum as its summands where they jump, or decide where something else does; a fold
-        whose steps jump as these."""
+        whose steps jump as these; None for what stays."""
         if isinstance(node, App):
-            return self.applied(node, depth)
+            return self.applied(node)
         if isinstance(node, Sum) and (decides or any(isinstance(part, App | Branch) for part in postorder(node.body))):
-            return self.summed(node, depth, decides)
+            return self.summed(node, decides)
         if isinstance(node, Fold) and (decides or any(isinstance(part, App | Branch) for part in postorder(node.body))):
-            return self.stepped(node, depth)
-        return node
+            return self.stepped(node)
+        return None
 
-    def applied(self, call: App, depth: int) -> Term:
+    def applied(self, call: App) -> Step:
         head, groups = spine(call)
         function = head if isinstance(head, Lam) else self.resolve(head)
         if not isinstance(function, Lam):
             return call
+        return (yield self.calls.carried_out(call, function, groups, self.inside))
 
-        def run(body: Term) -> Term:
-            if depth > DEEPEST or len(self.calls.known) > MOST_CALLS:
-                raise _TooMuch
-            return self.run(body, depth + 1)
+    def inside(self, body: Term) -> Step:
+        """What is carried out within a function."""
+        self.begun += 1
+        if self.begun > MOST_CALLS:
+            raise _TooMuch
+        return self.run(body)
 
-        return self.calls.carried_out(call, function, groups, run)
-
-    def summed(self, node: Sum, depth: int, decides: bool) -> Term:
+    def summed(self, node: Sum, decides: bool) -> Step:
         """What an endless sum goes on with stays a sum, unless it decides: jumps there are next to nothing."""
         numbers = self.numbers(node)
         if numbers is None:
             return node
-        terms = [self.run(substitute(node.body, {node.variable: const(k)}), depth + 1) for k in numbers]
+        terms = []
+        for k in numbers:
+            terms.append((yield self.run(substitute(node.body, {node.variable: const(k)}))))
         if node.endless and not decides:
             terms.append(sum_(node.variable, const(numbers.stop), const(numbers.stop - 1), node.body, True))
         return add(*terms)
 
-    def stepped(self, node: Fold, depth: int) -> Term:
+    def stepped(self, node: Fold) -> Step:
         numbers, state = self.numbers(node), node.start
         if numbers is None:
             return node
         for k in numbers:
-            state = self.run(substitute(node.body, {node.variable: const(k), node.state: state}), depth + 1)
+            state = yield self.run(substitute(node.body, {node.variable: const(k), node.state: state}))
         return state
 
     def numbers(self, node: Sum | Fold) -> range | None:

@@ -28,9 +28,9 @@ from potto.core.terms import (
     Proj,
     Sum,
     Term,
+    Told,
     Tuple,
     Var,
-    postorder,
 )
 
 _WRITTEN_OUT = Sum | Fold | Array | Index | Length | ListOf | Tuple | Data
@@ -42,12 +42,16 @@ def enclosable(term: Term, jumps: bool = False) -> bool:
     Sums, folds and arrays are written out before any number is asked for (`unrolled`), and what plain conditionals
     decide is decided.
     """
-    return all(
+    return _smooth(term) or (jumps and _jumping(term))
+
+
+def _can_be(node: Term, jumps: bool) -> bool:
+    """Whether a term can be enclosed where its parts can."""
+    return (
         isinstance(node, Const | Var | If | _WRITTEN_OUT)
         or (isinstance(node, Proj) and isinstance(node.term, Proj | Var | Index | Fold))
         or (isinstance(node, Prim) and (node.op in ARITHMETIC or RANGES.knows(node.op)))
         or (jumps and isinstance(node, Branch))
-        for node in postorder(term, below=_parts)
     )
 
 
@@ -60,6 +64,10 @@ def _parts(node: Term) -> Sequence[Term]:
             return ()
         case _:
             return value_parts(node)
+
+
+_smooth = Told[bool](lambda node, parts: all(parts) and _can_be(node, False), _parts)
+_jumping = Told[bool](lambda node, parts: all(parts) and _can_be(node, True), _parts)
 
 
 def _defined(array: Term) -> bool:

@@ -1,22 +1,21 @@
 """The surfaces of a term: where it jumps, where it has a kink, where it stops being smooth, through its calls.
 
-Owns `findings`. A function compiled alone exports its conditions as terms over its parameters; here a caller's
-arguments are put in for them. Each jump comes with the trace that forces it: the path of sites from the term to the
-branch. Plain conditions and sums that decide what there is are asked of `decide`, so that a recursion is followed
-only as deep as its values go.
+Owns `findings` and `surfaces_below`. A function compiled alone exports its conditions as terms over its parameters;
+here a caller's arguments are put in for them. Each jump comes with the trace that forces it: the path of sites from the
+term to the branch. Plain conditions and sums that decide what there is are asked of `decide`, so that a recursion is
+followed only as deep as its values go.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from functools import lru_cache
 
-from msgspec import Struct
 from msgspec.structs import replace
 
 from potto.calculus.decomposition.sweep import sweep
 from potto.calculus.inlining.currying import arguments_of, groups_of, sizes_of, uncurry
-from potto.calculus.inlining.expand import expanded, holds_call
+from potto.calculus.inlining.expand import Expansion, holds_call
 from potto.calculus.surfaces.case_split import by_extremes
 from potto.calculus.surfaces.domains import ends_of_domain
 from potto.calculus.surfaces.finding import Decide, Finding, Resolve
@@ -41,6 +40,7 @@ from potto.core.terms import (
     postorder,
     proj,
     substitute,
+    tuple_,
 )  # fmt: skip
 from potto.primitives import PRIMITIVES
 
@@ -73,6 +73,11 @@ def findings(term: Term, resolve: Resolve, decide: Decide = undecided) -> tuple[
     return _Search(resolve, decide).findings(term)
 
 
+def surfaces_below(terms: Iterable[Term], resolve: Resolve, decide: Decide) -> tuple[Finding, ...]:
+    """The surfaces of some terms together, whatever they have in common once, without traces. Raises TooDeep."""
+    return _Search(resolve, decide, set()).findings(tuple_(terms))
+
+
 @lru_cache(maxsize=4096)
 def _telling(term: Term) -> tuple[Prim | Integral, ...]:
     """The builtins and integrals of a term that may jump or bend somewhere: of hundreds of sums and products none."""
@@ -86,31 +91,44 @@ def _turns(node: Prim) -> bool:
     return bool(node.free and turning)
 
 
-def _carried_out(f: Finding, resolve: Resolve) -> Finding:
-    critical = f.critical
-    if critical is None and not holds_call(f.surface):
-        return f
-    if critical is not None:
-        critical = critical.mapped(lambda equation: carried_out(equation, resolve, ROUNDS))
-    return replace(f, surface=carried_out(f.surface, resolve, ROUNDS), critical=critical)
-
-
-def carried_out(term: Term, resolve: Resolve, rounds: int = 1) -> Term:
+def carried_out(term: Term, resolve: Resolve) -> Term:
     """A term with the calls in it replaced by what they give, as far as `resolve` knows, also of functions that are
     parameters: then it can be solved. A recursion stays a call after some rounds."""
-    if not holds_call(term):
-        return term
-    known = {node.name: resolve(node) for node in postorder(term) if isinstance(node, Var)}
-    passed: dict[str, Term] = {name: function for name, function in known.items() if isinstance(function, Lam)}
-    return expanded(substitute(term, passed), resolve, rounds=rounds)
+    return _Carrying(resolve).out(term)
 
 
-class _Search(Struct, frozen=True):
-    resolve: Resolve
-    decide: Decide
+class _Carrying:
+    """Terms with calls carried out, each with the same arguments once."""
+
+    def __init__(self, resolve: Resolve, rounds: int = 1) -> None:
+        self.resolve = resolve
+        self.expansion = Expansion(resolve, rounds=rounds)
+
+    def out(self, term: Term) -> Term:
+        if not holds_call(term):
+            return term
+        known = {node.name: self.resolve(node) for node in postorder(term) if isinstance(node, Var)}
+        passed: dict[str, Term] = {name: function for name, function in known.items() if isinstance(function, Lam)}
+        return self.expansion.of(substitute(term, passed))
+
+    def found(self, f: Finding) -> Finding:
+        if f.critical is None and not holds_call(f.surface):
+            return f
+        critical = None if f.critical is None else f.critical.mapped(self.out)
+        return replace(f, surface=self.out(f.surface), critical=critical)
+
+
+class _Search:
+    """once: calls that were gone into, where each is gone into once, whoever calls."""
+
+    def __init__(self, resolve: Resolve, decide: Decide, once: set[tuple[Term, ...]] | None = None) -> None:
+        self.resolve = resolve
+        self.decide = decide
+        self.once = once
+        self.near, self.deep = _Carrying(resolve), _Carrying(resolve, ROUNDS)
 
     def findings(self, term: Term) -> tuple[Finding, ...]:
-        found = tuple(_carried_out(f, self.resolve) for f in self.term(term, {}, (), 0))
+        found = tuple(self.deep.found(f) for f in self.term(term, {}, (), 0))
         ends = {end: None for f in found if f.kind == "jump" for end in ends_of_domain(f.surface)}
         return (*found, *(Finding("kink", end) for end in ends))
 
@@ -146,7 +164,7 @@ class _Search(Struct, frozen=True):
 
     def pieces(self, surface: Term, mapping: dict[str, Term]) -> Iterator[Term]:
         """What a surface is on either side of the conditions inside of it, also of those that calls lead to."""
-        surface = carried_out(substitute(surface, mapping), self.resolve)
+        surface = self.near.out(substitute(surface, mapping))
         return (piece for piece in pieces(surface) if piece.free)
 
     def nested(self, node: Integral, mapping: dict[str, Term]) -> Iterator[Finding]:
@@ -190,6 +208,10 @@ class _Search(Struct, frozen=True):
             return
         for _ in range(order):
             args = tuple(map(_primal, args))
+        if self.once is not None:
+            if (function, *args) in self.once:
+                return
+            self.once.add((function, *args))
         yield from self.term(body, dict(zip(params, args, strict=True)), path, depth + 1)
 
     def called(self, head: Term) -> tuple[Lam, tuple[tuple[Term, ...], ...], int] | None:

@@ -46,6 +46,7 @@ from potto.core.terms import (
     proj,
     rebuild,
     transform,
+    tuple_,
     with_integrand,
 )
 
@@ -138,13 +139,12 @@ class _Trees:
         self.memo: dict[Term, Tree] = {}
         self.written: dict[Tree, Term] = {}
         surfaces = [c for node in outside(body, (Integral,)) for c in coordinates_of(node)]
-        self.inner = {node for s in surfaces for node in outside(s, BINDERS) if isinstance(node, Branch)}
+        self.inner = {node for node in outside(tuple_(surfaces), BINDERS) if isinstance(node, Branch)}
 
     def apart(self, body: Term) -> Term:
         """The body with each part that has nested conditions written as decisions."""
         roots = [node for node in postorder(body, below=self.until_it_nests) if self.nests(node)]
-        met = [self.inner.intersection(outside(root, BINDERS)) for root in roots]
-        if sum(map(len, met)) > len(set().union(*met)) or any(isinstance(root, Delta) for root in roots):
+        if any(isinstance(root, Delta) for root in roots) or self.share(roots):
             return self.write(self.tree(body))  # they are decided together
         known = {root: self.write(self.tree(root)) for root in roots}
 
@@ -152,6 +152,16 @@ class _Trees:
             return () if node in known or isinstance(node, BINDERS) else children(node)
 
         return transform(body, lambda node, new: known.get(node, new), below)
+
+    def share(self, roots: Sequence[Term]) -> bool:
+        """Whether some inner condition is met in several of these."""
+        met = set[Term]()
+        for root in roots:
+            own = self.inner.intersection(outside(root, BINDERS))
+            if not met.isdisjoint(own):
+                return True
+            met |= own
+        return False
 
     def nests(self, node: Term) -> bool:
         return any(nested(c) for c in coordinates_of(node))

@@ -15,7 +15,7 @@ from msgspec import Struct
 
 from potto.calculus.algebra.degree import plane
 from potto.calculus.differentiation.level_sets import placed_along
-from potto.calculus.inlining.expand import expanded
+from potto.calculus.inlining.expand import Expansion, expanded
 from potto.calculus.solving.enclosable import enclosable
 from potto.calculus.surfaces.domains import ends_of_domain
 from potto.calculus.surfaces.finding import Resolve
@@ -123,7 +123,8 @@ def sided(term: Integral, inline: Resolve) -> Sided | None:
         return None
     written = {n.name: f for n in postorder(body) if isinstance(n, Var) and (f := inline(n)) is not None}
     surfaces = dict.fromkeys(node.surface for node in _branches(body))
-    forms = {s: expanded(substitute(s, written), inline) for s in surfaces}
+    expansion = Expansion(inline)
+    forms = {s: expansion.of(substitute(s, written)) for s in surfaces}
     ends = {form: ends_of_domain(form) for form in forms.values() if enclosable(form)}
     told = {s: form for s, form in forms.items() if form in ends and all(map(enclosable, ends[form]))}
     flat = all(plane(form, (name,)) for form in told.values() for name in term.variables)
