@@ -210,3 +210,23 @@ def test_a_recursion_that_places_deltas_is_refused_where_its_depth_is_not_known(
         potto.hessian(m.f, ["t"])(n, 0.5)
     assert [d.code for d in caught.value.diagnostics] == ["P0510"]
     assert "recursion" in caught.value.diagnostics[0].message
+
+
+ROUND = {
+    "disc": ("[-sqrt(t), sqrt(t)] (integral [-sqrt(t - x^2), sqrt(t - x^2)] x^2 d(y)) d(x)", math.pi / 2),  # pi t^2/4
+    "half": ("[-sqrt(t), sqrt(t)] (integral [0, sqrt(t - x^2)] y d(y)) d(x)", 0.5 / math.sqrt(0.7)),  # 2/3 t^1.5
+    "quarter": ("[0, sqrt(t)] (integral [0, sqrt(t - x^2)] x*y d(y)) d(x)", 0.25),  # t^2/8
+    "sheared": ("[1 - sqrt(t), 1 + sqrt(t)] "
+                "(integral [x - sqrt(t - (x - 1)^2), x + sqrt(t - (x - 1)^2)] (y - x)^2 d(y)) d(x)", math.pi / 2),
+    "bracket that touches": ("[-sqrt(t), sqrt(t)] (integral [-2, 2] [y^2 < t - x^2]*x^2 d(y)) d(x)", math.pi / 2),
+    "ball": ("[-sqrt(t), sqrt(t)] (integral [-sqrt(t - x^2), sqrt(t - x^2)] "
+             "(integral [-sqrt(t - x^2 - y^2), sqrt(t - x^2 - y^2)] z^2 d(z)) d(y)) d(x)",
+             math.pi * math.sqrt(0.7)),  # 4/15 pi t^2.5
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ROUND)
+def test_bounds_that_turn_where_a_body_ends_are_its_rim(name: str) -> None:
+    program, second = ROUND[name]
+    found = potto.hessian(potto.compile(f"def f(t) integral {program}").f)(0.7)
+    assert abs(found.value - second) <= found.error <= 1e-9

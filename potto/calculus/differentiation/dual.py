@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from potto.calculus.decomposition.conditioned import conditioned
 from potto.calculus.decomposition.joined import joined
 from potto.calculus.decomposition.normal_combinations import combined
 from potto.calculus.differentiation import loops
@@ -369,6 +370,8 @@ class _Pass:
         if not isinstance(whole, Integral) or fewer is not whole:  # deltas of a combination have one root
             return _Pass(self.owner, self.tangents).run(fewer)
         plain = without_leftovers(without_deltas(whole, self.owner.wanted))
+        if isinstance(plain, Integral) and not apart and not self.owner.frozen:
+            plain = conditioned(plain)
         if not isinstance(plain, Integral):
             return _Pass(self.owner, self.tangents).run(plain)
         moving = {n: t for n, t in self.tangents.items() if n not in plain.variables}
