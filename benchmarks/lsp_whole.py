@@ -142,7 +142,7 @@ def drawn(rows: Rows, file: Path) -> None:
 
 def main() -> None:
     sizes = tuple(int(size) for size in sys.argv[1:]) or SIZES
-    with tempfile.TemporaryDirectory() as cache:
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as cache:  # an evaluation may still write there
         os.environ["POTTO_CACHE"] = cache
         as_installed()
         print(table(sizes_measured(sizes)))

@@ -182,6 +182,17 @@ def test_a_list_is_fast_in_a_large_workspace():
     assert sorted(times)[len(times) // 2] < 0.02  # the goal is 0.005 on an idle machine
 
 
+def test_of_a_long_file_the_likeliest_names_are_listed() -> None:
+    """Those that only contain the letters come last, and there are more to be asked for."""
+    long = "".join(f"def some_{n}(x) x\n" for n in range(600)) + "def me(x) x\ndef g(a) "
+    f = fixture(long + "a + me$0\n")
+    found = ide.completions(f.db, f.file, f.offset)
+    own = [item.label for item in found.items if item.data[:1] == ("definition",)]
+    assert own[0] == "me" and len(own) == 500 and found.incomplete
+    f = fixture(long + "a + some_59$0\n")
+    assert not ide.completions(f.db, f.file, f.offset).incomplete
+
+
 def first(text: str, count: int = 1) -> list[str]:
     """The first proposals in their order."""
     f = fixture(text)

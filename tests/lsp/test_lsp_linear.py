@@ -139,6 +139,24 @@ def test_a_key_runs_as_many_queries_in_a_large_file_as_in_a_small_one(method: st
     assert len(ran[0]) <= 12, ran[0]
 
 
+@pytest.mark.parametrize("method", ["hover", "documentHighlight", "references", "prepareRename", "codeAction"])
+def test_after_a_key_a_name_costs_as_much_in_a_file_sixteen_times_as_long(method: str) -> None:
+    """`f0`, which stands nowhere else: chunks without it are not looked at."""
+    calls = []
+    for n in (FEW, FEW, 16 * FEW):  # the first one loads what is loaded once
+        with asked(plain, n) as (made, text):
+            line = text.text[: text.text.index("f0")].count("\n")
+            place = {"line": line, "character": 4}
+            params = {**DOCUMENT, "position": place, "range": {"start": place, "end": place}, "context": {}}
+            answer = FEATURES[f"textDocument/{method}"].answer
+            answer(Ask(made, params))
+            edited = put(made, text.text.replace(f"k^2+{n // 2}", f"k^3+{n // 2}"), 2)
+            assert edited.lines.count > n  # an edit by a range does not count them anew
+            made.analysis.diagnostics("/nowhere/whole.po")
+            calls.append(calls_in(lambda: answer(Ask(made, params))))  # noqa: B023
+    assert calls[2] <= 1.25 * calls[1] + 250, calls
+
+
 def test_colours_after_a_key_are_those_of_a_fresh_session() -> None:
     """They are put together from what was kept for each chunk, wherever it stands now."""
     made = session()

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from potto.ide.model import Edit
-from potto.ide.names.places import ChunkAt, all_chunks, text_of
+from potto.ide.names.places import ChunkAt, all_chunks, chunks_with, text_of
 from potto.modules import find_module, names
 from potto.modules.workspace import files, module_name
 from potto.query import Database, query
@@ -58,7 +58,12 @@ def new_line(db: Database, file: str, line: str) -> Edit:
 
 def import_chunks(db: Database, file: str) -> list[ChunkAt]:
     """The chunks that are imports, in order."""
-    return [c for c in all_chunks(db, file) if isinstance(c.parsed(db).item, nodes.FromImport | nodes.Import)]
+    return [chunk for chunk in chunks_with(db, file, ("import",)) if is_import(db, chunk)]
+
+
+def is_import(db: Database, chunk: ChunkAt) -> bool:
+    """Whether a chunk is an import."""
+    return isinstance(chunk.parsed(db).item, nodes.FromImport | nodes.Import)
 
 
 def importable(db: Database, file: str, word: str, hidden: Iterable[str], most: int) -> list[tuple[str, str]]:

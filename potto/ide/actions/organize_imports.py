@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import takewhile
 
 from potto.ide.actions.edits import minimal, one_file
-from potto.ide.actions.imports import import_chunks
+from potto.ide.actions.imports import import_chunks, is_import
 from potto.ide.actions.offers import At, PendingAction
 from potto.ide.model import Change
 from potto.ide.names.places import ChunkAt, all_chunks
 from potto.modules import names
 from potto.modules.usage import unused_imports
 from potto.query import Database
+from potto.source import Span
 from potto.syntax import format_source, nodes
 
 
@@ -48,13 +50,9 @@ def organized(db: Database, file: str, text: str, drop: bool) -> Change | None:
 
 def _head(db: Database, file: str) -> list[ChunkAt]:
     """The imports that follow one another, from the first one."""
-    head: list[ChunkAt] = []
-    for chunk in all_chunks(db, file):
-        if isinstance(chunk.parsed(db).item, nodes.FromImport | nodes.Import):
-            head.append(chunk)
-        elif head:
-            break
-    return head
+    found = import_chunks(db, file)
+    around = all_chunks(db, file, Span(found[0].start, found[-1].start)) if found else ()
+    return list(takewhile(lambda chunk: is_import(db, chunk), around))
 
 
 def _lines(db: Database, head: list[ChunkAt], gone: frozenset[str]) -> list[str]:

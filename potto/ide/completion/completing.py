@@ -40,6 +40,7 @@ from potto.source import Span
 from potto.types import TupleOf, format_type, groups_of
 
 MOST_IMPORTS = 100  # proposals from other modules in one list
+MOST_NAMES = 500  # of the file and of its imports: nobody reads more, and with each further letter there are fewer
 
 # Groups of proposals in the order of their likelihood.
 _ARGUMENT, _LOCAL, _OWN, _IMPORTED, _BUILTIN, _WORD, _OTHER = "0123456"
@@ -96,10 +97,20 @@ def _everything(db: Database, site: Site, place: CompletionPlace) -> Completions
     items: dict[str, Completion] = {}
     for item in (*_arguments(db, site, place), *_locals(db, site, place)):
         items.setdefault(item.label, item)
-    for item in (*_file_names(db, site, place), *builtin_items(place), *_keywords(site, place)):
+    names, left_out = _likeliest(list(_file_names(db, site, place)), place.word)
+    for item in (*names, *builtin_items(place), *_keywords(site, place)):
         items.setdefault(item.label, item)
     others = _others(db, site.file, place, items) if place.word else []
-    return Completions(place.span, (*items.values(), *others), not place.word or len(others) >= MOST_IMPORTS)
+    incomplete = left_out or not place.word or len(others) >= MOST_IMPORTS
+    return Completions(place.span, (*items.values(), *others), incomplete)
+
+
+def _likeliest(names: list[Completion], word: str) -> tuple[list[Completion], bool]:
+    """So many names as a list may have, first those that begin as the word does; whether some are left out."""
+    begun = word.casefold()
+    if len(names) > MOST_NAMES:
+        names.sort(key=lambda item: not item.label.casefold().startswith(begun))
+    return names[:MOST_NAMES], len(names) > MOST_NAMES
 
 
 def _letters(place: CompletionPlace) -> Iterator[Completion]:

@@ -6,14 +6,14 @@ Owns the conversion from absolute offsets to what is memoized relative to chunks
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from typing import Literal
 
 from msgspec import Struct
 
 from potto.ide.names.index import NameIndex, index
 from potto.modules import ChunkRef, chunk_start, chunks, is_diffeo, parsed, source
-from potto.modules.texts import defined_twice, layout, piece
+from potto.modules.texts import at, defined_twice, layout, piece
 from potto.query import Database, query
 from potto.source import NOWHERE, Span
 from potto.syntax import ParsedChunk, nodes
@@ -82,16 +82,19 @@ def text_of(db: Database, file: str) -> str:
     return "" if found is None else found.text
 
 
-@query
-def chunk_starts(db: Database, file: str) -> tuple[int, ...]:
-    """Where the chunks of a file start."""
-    return tuple(chunk.start for chunk in chunks(db, file))
-
-
 def chunk_at(db: Database, file: str, offset: int) -> ChunkAt | None:
     """The chunk that contains an offset, or ends before it; None in front of the first one."""
-    place = bisect_right(chunk_starts(db, file), offset) - 1
-    return None if place < 0 else chunk_of(file, chunks(db, file)[place])
+    found = layout(db, file)
+    for place in reversed(range(bisect_right(found.starts, offset))):
+        start, inside = found.starts[place], found.pieces[place].chunks
+        number = bisect_right(inside, offset - start, key=_start)
+        if number:
+            return chunk_of(file, at(inside[number - 1], start))
+    return None
+
+
+def _start(chunk: ChunkRef) -> int:
+    return chunk.start
 
 
 def writing_at(db: Database, file: str, offset: int) -> tuple[ChunkAt, int] | None:
@@ -147,12 +150,24 @@ def chunk_of(file: str, chunk: ChunkRef) -> ChunkAt:
 
 def all_chunks(db: Database, file: str, span: Span | None = None) -> tuple[ChunkAt, ...]:
     """The chunks of a file, or those that touch a span."""
-    found = chunks(db, file)
-    if span is not None:
-        starts = chunk_starts(db, file)
-        first = max(bisect_right(starts, span.start) - 1, 0)
-        found = found[first : bisect_right(starts, span.end)]
-    return tuple(chunk_of(file, chunk) for chunk in found)
+    if span is None:
+        return tuple(chunk_of(file, chunk) for chunk in chunks(db, file))
+    found, first = layout(db, file), chunk_at(db, file, span.start)
+    least = 0 if first is None else first.start
+    touched = range(max(bisect_right(found.starts, least) - 1, 0), bisect_right(found.starts, span.end))
+    near = (at(chunk, found.starts[place]) for place in touched for chunk in found.pieces[place].chunks)
+    return tuple(chunk_of(file, chunk) for chunk in near if least <= chunk.start <= span.end)
+
+
+def chunks_with(db: Database, file: str, words: Collection[str]) -> Iterator[ChunkAt]:
+    """The chunks of a file in whose text one of some words occurs, as a word or within one. Its pieces are looked
+    through first: of a long file few have it."""
+    found, diffeo = layout(db, file), is_diffeo(file)
+    for one, start in zip(found.pieces, found.starts):
+        if any(word in one.text for word in words):
+            for chunk in one.chunks:
+                if any(word in chunk.text for word in words):
+                    yield ChunkAt(file, start + chunk.start, chunk.text, diffeo)
 
 
 class PieceAt(Struct, frozen=True):

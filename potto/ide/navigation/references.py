@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping
 from potto.ide.model import Highlight, Location
 from potto.ide.names.index import Occurrence
 from potto.ide.names.parts import is_part, occurrences
-from potto.ide.names.places import ChunkAt, all_chunks, owner
+from potto.ide.names.places import ChunkAt, all_chunks, chunks_with, owner
 from potto.ide.names.symbols import (
     BuiltinSymbol,
     DefinitionSymbol,
@@ -120,7 +120,7 @@ def written_as(db: Database, file: str, name: str) -> frozenset[str]:
 def _in_file(db: Database, file: str, symbol: Symbol, words: frozenset[str] | None) -> Iterator[Place]:
     if words is not None and not any(mentions(db, file, word) for word in words):
         return
-    for chunk in all_chunks(db, file):
+    for chunk in all_chunks(db, file) if words is None else chunks_with(db, file, words):
         for occurrence in occurrences(db, chunk):
             if occurrence.binder >= 0 or (words is not None and occurrence.name not in words):
                 continue
@@ -151,9 +151,7 @@ def _local(db: Database, symbol: LocalSymbol, only: tuple[str, ...] | None) -> I
 
 def _parts(db: Database, file: str, symbol: LocalSymbol | PartSymbol, name: str) -> Iterator[Place]:
     """Where a part of a value is named: `c.focal`, `c with focal = 2`."""
-    for chunk in all_chunks(db, file):
-        if name not in chunk.text:
-            continue
+    for chunk in chunks_with(db, file, (name,)):
         for occurrence in occurrences(db, chunk):
             named = occurrence.name == name and is_part(db, file, occurrence)
             if named and meaning_of(db, chunk, occurrence) == symbol:
@@ -167,8 +165,8 @@ def _starts(parameter: nodes.Parameter, symbol: LocalSymbol) -> bool:
 def _keywords(db: Database, file: str, symbol: LocalSymbol, where: str, name: str) -> Iterator[Place]:
     """The keyword arguments, also those of derivatives (`dc` for `c`), that fill a parameter of a definition."""
     parameter = symbol.binder.name
-    for chunk in all_chunks(db, file):
-        if parameter not in chunk.text or "=" not in chunk.text:
+    for chunk in chunks_with(db, file, (parameter,)):
+        if "=" not in chunk.text:
             continue
         for occurrence in chunk.index(db).occurrences:
             if occurrence.role != "keyword" or occurrence.callee is None or not occurrence.name.endswith(parameter):

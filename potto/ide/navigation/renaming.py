@@ -15,7 +15,7 @@ from potto.ide.actions.edits import applied, change_of
 from potto.ide.model import Change, Edit, FileRename, Refused, Renaming
 from potto.ide.names.index import NameIndex, Occurrence, index
 from potto.ide.names.parts import occurrences, split
-from potto.ide.names.places import ChunkAt, all_chunks
+from potto.ide.names.places import ChunkAt, chunks_with
 from potto.ide.names.symbols import (
     BuiltinSymbol,
     FoundName,
@@ -134,7 +134,7 @@ def _rename_bound(db: Database, found: FoundName, new_name: str) -> Change | Ref
     for each in dict.fromkeys((*(where for where, _ in family), *files(db))):
         if not mentions(db, each, name):
             continue
-        for chunk in all_chunks(db, each):
+        for chunk in chunks_with(db, each, (name,)):
             for occurrence in occurrences(db, chunk):
                 if occurrence.name == name and occurrence.binder < 0 and _refers(db, chunk, occurrence) in wanted:
                     places.append((chunk, occurrence, new_name))
@@ -196,7 +196,7 @@ def _uses(db: Database, file: str, name: str) -> bool:
         return False
     return any(
         o.name == name and o.role == "use" and o.binder < 0
-        for chunk in all_chunks(db, file)
+        for chunk in chunks_with(db, file, (name,))
         for o in chunk.index(db).occurrences
     )
 

@@ -12,7 +12,7 @@ import re
 from potto.data.mistakes import DataMistake
 from potto.ide.model import Links, Location
 from potto.ide.names.documents import item_span, name_span
-from potto.ide.names.places import ChunkAt, all_chunks, chunk_at
+from potto.ide.names.places import ChunkAt, chunk_at, chunks_with
 from potto.ide.names.symbols import DefinitionSymbol, FoundName, LocalSymbol, ModuleSymbol, PartSymbol, symbol_at
 from potto.modules import DefinitionTarget, dependencies, references, resolve, resolve_member, source
 from potto.modules import definition as tree_of
@@ -116,7 +116,7 @@ def location(db: Database, file: str, name: str) -> Location:
 def import_of(db: Database, file: str, name: str) -> Location | None:
     """The import that binds a name (or a dotted module) in a file; None if a definition does."""
     last: Location | None = None
-    for chunk in all_chunks(db, file):
+    for chunk in chunks_with(db, file, (name,)):
         item = chunk.parsed(db).item
         if isinstance(item, nodes.Definition | nodes.DiffeoDefinition) and item.name == name:
             return None
