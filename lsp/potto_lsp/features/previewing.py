@@ -10,26 +10,40 @@ from typing import Any
 
 from potto import ide
 from potto.ide.display.pixels import PixelCondition, pixel_conditions
+from potto.ide.display.scenes import piece_scenes
 from potto.modules import chunk_start, chunk_text
+from potto.query import Database, query
 from potto.source import Span
 from potto_lsp import convert, protocol
 from potto_lsp.asking import Ask
 from potto_lsp.deferred import Deferred
 from potto_lsp.errors import InvalidParams
 from potto_lsp.features.commands import task
+from potto_lsp.features.whole import PieceItems, part_of, whole
+from potto_lsp.text import DocumentText, Encoding
+from potto_lsp.wire import Encoded
 
 MOST = 512 * 512  # places in one answer
 
 
-def scenes(ask: Ask) -> list[dict[str, Any]]:
+def scenes(ask: Ask) -> Encoded:
     """The functions of a file that can be drawn."""
-    return [
+    file, encoding = ask.file, ask.text.encoding
+    return whole(ask, lambda at: _part(ask.db, file, at.text, at.hidden, encoding))
+
+
+@query(keep=1024)
+def _part(db: Database, file: str, text: str, hidden: tuple[str, ...], encoding: Encoding) -> PieceItems:
+    """Those of a piece."""
+    place, found = DocumentText(text, encoding), piece_scenes(db, file, text, hidden)
+    return part_of(
         {
-            "name": scene.name, "range": ask.range(scene.span), "components": scene.components,
+            "name": scene.name, "range": convert.range_of(place, scene.span), "components": scene.components,
             "axes": list(scene.axes), "parameters": [_parameter(parameter) for parameter in scene.parameters],
         }
-        for scene in ide.scenes(ask.db, ask.file)
-    ]  # fmt: skip
+        for scene in found
+        if scene.axes
+    )  # fmt: skip
 
 
 def _parameter(parameter: ide.SceneParameter) -> dict[str, Any]:
@@ -71,13 +85,13 @@ def pixel(ask: Ask) -> Deferred:
     found = pixel_conditions(ask.db, ask.file, name, given)
     start = chunk_start(ask.db, ask.file, name)
     chunk = chunk_text(ask.db, ask.file, name) or ""
-    whole = ask.range(Span(start, start + len(chunk.rstrip())))
+    defined = ask.range(Span(start, start + len(chunk.rstrip())))
     written = [{"equation": each.equation, **_written(ask, each)} for each in found]
     surfaces = [{"text": each.text, "parameters": list(each.parameters)} for each in found]
 
     def placed(result: Mapping[str, Any]) -> dict[str, Any]:
         there = sorted(({**where, **one} for where, one in zip(written, result["seen"])), key=lambda c: c["pixels"])
-        return {"range": whole, "conditions": there}
+        return {"range": defined, "conditions": there}
 
     more = {"surfaces": surfaces, "values": values, "cell": cell}
     return task(ask, "pixel", ask.file, name, more, placed, quiet=True)
