@@ -1,4 +1,5 @@
-"""What a key costs in files of 100 to 20,000 lines, and what editors ask about whole files: cold, and after a key.
+"""What a key costs in files of 100 to 20,000 lines, and what editors ask about whole files and about places in them:
+cold, and after a key.
 
 Run: `python benchmarks/lsp_whole.py [LINES ...]`. Milliseconds of processor time of the server, which other work on the
 machine lengthens by half and not tenfold. Cold it should grow as the file does, and after a key hardly at all.
@@ -24,7 +25,13 @@ SIZES = (100, 300, 1_000, 2_000, 5_000, 20_000)
 KEYS = 9
 METHODS = (
     "codeLens", "semanticTokens/full", "documentSymbol", "inlayHint", "foldingRange", "documentLink", "formatting",
+    "hover", "completion", "signatureHelp", "definition", "documentHighlight", "references", "rename", "codeAction",
+    "selectionRange", "inlineValue",
 )  # fmt: skip
+WRITING = (
+    "completion",
+    "signatureHelp",
+)  # asked where the keys are typed; of the others a place is a definition's name
 Rows = dict[str, dict[int, float]]  # ms of each thing by lines
 
 
@@ -46,6 +53,8 @@ class Whole:
     def __init__(self, folder: Path, text: str) -> None:
         self.client, self.lines, self.tokens = Client(folder), text.count("\n"), ""
         self.line, self.column = place_of(text)
+        lines = text.split("\n")
+        self.name = next(n for n in range(self.line, -1, -1) if lines[n].startswith("def ")), len("def ")
         self.client.open("large", text)
         self.client.diagnosed("large")
         self.client.quiet(1.0)
@@ -62,7 +71,12 @@ class Whole:
         """Milliseconds of processor time for a request."""
         whole = {"start": {"line": 0, "character": 0}, "end": {"line": self.lines, "character": 0}}
         options = {"tabSize": 4, "insertSpaces": True}
-        params: dict[str, Any] = {"range": whole, "options": options}
+        line, column = (self.line, self.column + len("sqrt(")) if method in WRITING else self.name
+        place, context = {"line": line, "character": column}, {"diagnostics": [], "includeDeclaration": True}
+        params: dict[str, Any] = {
+            "range": {"start": place, "end": place} if method == "codeAction" else whole,
+            "options": options, "position": place, "positions": [place], "newName": "renamed", "context": context,
+        }  # fmt: skip
         if method == "semanticTokens/full" and self.tokens:
             method, params = "semanticTokens/full/delta", {"previousResultId": self.tokens}
         before = self.client.processor()
