@@ -1,13 +1,15 @@
 """Memory that is freed is kept for the arrays to come.
 
-Owns `kept`, `room` and `copied`. The allocator of C gives large blocks back to the system when they are freed, and maps
-their pages anew for the next one, which takes as long as what is done to the numbers in them, or several times as long.
+Owns `kept`, `room`, `copied` and `apart`. The allocator of C gives large blocks back to the system when they are freed,
+and maps their pages anew for the next one, which takes as long as what is done to the numbers in them, or several times
+as long.
 """
 
 from __future__ import annotations
 
 import math
 import sys
+from collections.abc import Iterable
 from functools import lru_cache
 from mmap import mmap
 from threading import Lock
@@ -53,6 +55,18 @@ def copied(array: NDArray[Any]) -> Array:
     found = room(*array.shape)
     found[...] = array
     return found
+
+
+def apart(parts: Iterable[Any]) -> bool:
+    """Whether no two arrays in tuples and lists of parts are one."""
+    starts, left = list[int](), [*parts]
+    while left:
+        part = left.pop()
+        if isinstance(part, np.ndarray):
+            starts.append(part.ctypes.data)
+        elif isinstance(part, tuple | list):
+            left += part
+    return len(set(starts)) == len(starts)
 
 
 def _free(size: int) -> NDArray[np.uint8]:

@@ -19,7 +19,7 @@ from msgspec.structs import replace
 from potto.diagnostics import PottoError, declare
 from potto.kernels.cells import Cell, Rows, Value, listed
 from potto.kernels.errors import wrong_call
-from potto.kernels.memory import copied
+from potto.kernels.memory import apart, copied
 from potto.python.arrays import answers_in, batch_shapes, halves, holds_functions, over_batch
 from potto.runtime.answers.estimate import Estimate
 from potto.runtime.answers.named import alike
@@ -77,7 +77,7 @@ class Batch(Struct, frozen=True):
         ):
             return estimate
         parts = (estimate.value, estimate.error, estimate.tangent, estimate.tangent_error)
-        value, error, tangent, tangent_error = (self.restored(part, own) for part in parts)
+        value, error, tangent, tangent_error = (self.restored(part, own and apart(parts)) for part in parts)
         shaped = replace(estimate, value=value, error=error, tangent=tangent, tangent_error=tangent_error)
         if self.shape is None:
             return replace(shaped, member_converged=None, shortfalls=dict.fromkeys(estimate.shortfalls, True))
@@ -132,7 +132,7 @@ class Batch(Struct, frozen=True):
         if array.ndim > 1 and len(array) == count:  # arrays of members, put together from tiles
             return array.reshape(*self.shape, *array.shape[1:])
         whole = np.broadcast_to(array.reshape(-1), (count,)).reshape(self.shape)
-        return array.reshape(self.shape) if own and array.size == count else copied(whole)
+        return array.reshape(self.shape) if own and array.size == count and array.flags.carray else copied(whole)
 
 
 def batch_of(arguments: Iterable[tuple[str, Any]]) -> Batch:
@@ -269,7 +269,7 @@ def _array(name: str, argument: np.ndarray[Any, Any], batch: Batch) -> Value:
         raise no_kind(name, argument, "an array must hold real numbers")
     if argument.ndim == 0:
         return Cell(float(argument))
-    return Cell(batch.flat(copied(argument)))
+    return Cell(batch.flat(np.require(argument, np.float64, ("A", "E"))))  # read by machine code, written by nobody
 
 
 def _estimate(name: str, argument: Estimate, batch: Batch, to_function: ToFunction) -> Value:

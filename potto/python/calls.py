@@ -51,7 +51,8 @@ class Call(Struct, frozen=True, eq=False):
         with Clock() as clock:
             value = self.value(values, machine)
         estimate = report(value, machine, clock)
-        found = named_answer(batch.shaped(as_dual(estimate) if self._gives_dual() else estimate), self.result)
+        whole = as_dual(estimate) if self._gives_dual() else estimate
+        found = named_answer(batch.shaped(whole, own=machine.record.fresh), self.result)
         if 1 < batch.size < LEAST:
             self.keep((), values, found, machine=machine)
         return found

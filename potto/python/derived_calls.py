@@ -26,7 +26,7 @@ from potto.python.sided import with_sides
 from potto.python.slopes import Gradient
 from potto.runtime.answers.estimate import Estimate
 from potto.runtime.answers.records import named
-from potto.runtime.evaluate import Clock, bar, report, told
+from potto.runtime.evaluate import Clock, bar, number, report, told
 from potto.runtime.evaluation.derivatives.sides import as_a_whole
 from potto.runtime.evaluation.machine import Machine
 from potto.runtime.evaluation.record import Record
@@ -178,8 +178,10 @@ class DerivedCall:
             self.call.keep(args, values, found, wrt, machine)
 
     def answer(self, value: Value, tangents: Any, bounds: Any) -> Estimate:
-        found = report(value, self.machine, self.clock)
-        shaped = self.batch.shaped(replace(found, tangent=tangents, tangent_error=bounds))
+        return self._with(report(value, self.machine, self.clock), tangents, bounds)
+
+    def _with(self, found: Estimate, tangents: Any, bounds: Any, own: bool = False) -> Estimate:
+        shaped = self.batch.shaped(replace(found, tangent=tangents, tangent_error=bounds), own)
         return replace(shaped, value=named(shaped.value, self.call.result))
 
     def one_by_one(self, slopes: list[Any], names: tuple[str, ...]) -> tuple[Any, ...]:
@@ -196,10 +198,13 @@ class DerivedCall:
         directions = range(len(all_cells(tuple(own.values()))) if self.whole
                            else sum(size(name, value) for name, value in own.items()))  # fmt: skip
         form = self.call.result if moving is value else REAL
+        found = report(value, self.machine, self.clock)
+        known = number if moving is value and found.converged else bar  # of what has converged no error is nan
         tangents = [named(told(moving, lambda cell, d=d: cell.t[d]), form) for d in directions]  # type: ignore[misc]
-        bounds = [told(moving, lambda cell, d=d: bar(cell.et[d])) for d in directions]  # type: ignore[misc]
+        bounds = [told(moving, lambda cell, d=d: known(cell.et[d])) for d in directions]  # type: ignore[misc]
         forms = (by_name(part, own, self.whole) for part in (tangents, bounds))
-        found = self.answer(value, *(form[0] if len(wrt) == 1 else form for form in forms))
+        tangent, off = (form[0] if len(wrt) == 1 else form for form in forms)
+        found = self._with(found, tangent, off, moving is value and self.machine.record.fresh)
         return Gradient(**asdict(found), wrt=wrt)
 
 

@@ -12,6 +12,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
+from msgspec.structs import replace
 
 from potto.calculus.surfaces.discontinuities import TooDeep
 from potto.core.printer import format_equation, shortened
@@ -23,11 +24,13 @@ from potto.kernels.cells import Cell, Number, Rows, Value, all_cells
 from potto.kernels.making import counts
 from potto.projects.settings import DEFAULTS, SAMPLERS, Settings
 from potto.runtime.answers.convergence import (
+    Rough,
     Shortfalls,
     converged_members,
     members_of,
     merged,
     missed,
+    rough_of,
     steep,
 )
 from potto.runtime.answers.estimate import Estimate, OneSided
@@ -111,6 +114,7 @@ class Program:
         def found(machine: Machine, given: Mapping[str, Value] = given) -> Value:
             short = self.shortest(term) if given else None
             value = None if short is None else guarded(lambda: short.value(machine, given))
+            machine.record.fresh = value is not None and short is not None and short.fresh
             return guarded(lambda: machine.term(self.linker.ready(term), dict(given))) if value is None else value
 
         try:
@@ -216,15 +220,17 @@ def report(value: Value, machine: Machine, clock: Clock) -> Estimate:
         moving = any(p.tangent is not None for p in parts)
         tangent, tangent_error = ([getattr(p, side) for p in parts] if moving else None for side in _TANGENTS)
         return answer(values, off, tangent, tangent_error, converged=not missing, shortfalls=missing)
-    numbers, bounds = told(value, lambda cell: cell.v), told(value, lambda cell: bar(cell.e))
+    rtol, numbers = machine.settings.asked(_drawn(record)), told(value, lambda cell: cell.v)
+    shown = _flat(numbers, told(value, lambda cell: cell.e))  # nan of nan is another reason than inf of nan
+    rough, slopes = rough_of(shown, rtol), rough_of(_slopes(value), rtol)
+    error_of = bar if any(each.unknown for each in (*rough, *slopes)) else number
+    bounds = told(value, lambda cell: error_of(cell.e))
     tangents = tangent_bounds = None
     if any(cell.t for cell in all_cells(_without_functions(value))):
         tangents = told(value, lambda cell: cell.t[0] if cell.t else None)
-        tangent_bounds = told(value, lambda cell: bar(cell.et[0]) if cell.t else None)
-    shown = _flat(numbers, told(value, lambda cell: cell.e))  # nan of nan is another reason than inf of nan
-    slopes = _slopes(value)
-    missing = _missing(shown, slopes, machine)
-    merged(missing, steep([slope for slope, _ in slopes], missing))
+        tangent_bounds = told(value, lambda cell: error_of(cell.et[0]) if cell.t else None)
+    missing = _missing(rough, [replace(each, error=number(error_of(each.error))) for each in slopes], machine)
+    merged(missing, steep([each.number for each in slopes], missing))
     shape = np.broadcast_shapes(*(number.shape for number, _ in shown if isinstance(number, np.ndarray)))
     return answer(
         numbers, bounds, tangents, tangent_bounds, converged=not missing,
@@ -268,26 +274,32 @@ def _slopes(value: Value) -> list[tuple[Any, Any]]:
         return [pair for item in value for pair in _slopes(item)]
     if isinstance(value, Closure):
         return []
-    return [(number(t), number(bar(et))) for c in all_cells(value) for t, et in zip(c.t, c.et, strict=True)]
+    return [(number(t), number(et)) for c in all_cells(value) for t, et in zip(c.t, c.et, strict=True)]
 
 
-def _missing(numbers: list[tuple[Any, Any]], slopes: list[tuple[Any, Any]], machine: Machine) -> Shortfalls:
-    """Why the numbers are not as accurate as was asked for: as was noted, and for other members by their errors."""
+def _missing(numbers: Sequence[Rough], slopes: Sequence[Rough], machine: Machine) -> Shortfalls:
+    """Why numbers that are not precise are not as accurate as was asked for: as was noted, and for other members by
+    their errors."""
     record, settings = machine.record, machine.settings
     reasons = {**record.shortfalls, **{why: True for why, _ in machine.events.every(Shortfall)}}
-    before = dict(reasons)
-    drawn = not record.methods.isdisjoint(SAMPLERS)
-    every = ((pair, why) for why, pairs in ((BOUNDLESS, numbers), (STEEP, slopes)) for pair in pairs)
-    for (number, error), infinite in every:
-        found = missed(number, error, record.allowed, settings, drawn)
+    before, drawn = dict(reasons), _drawn(record)
+    every = ((each, why) for why, those in ((BOUNDLESS, numbers), (STEEP, slopes)) for each in those)
+    for each, infinite in every:
+        found = missed(each, record.allowed, settings, drawn)
         if not found or any(where is True for where in before.values()):
             continue
-        found = _blamed(found, record, np.shape(number), infinite)
+        shape = np.shape(each.number)
+        found = _blamed(found, record, shape, infinite)
         if found and any(rough(answer, settings.rtol, settings.atol) for answer in record.used.values()):
             found = {ROUGH: np.logical_or.reduce(list(found.values()))}
-        told = converged_members(before, np.shape(number))
+        told = converged_members(before, shape)
         merged(reasons, {why: where & told if np.ndim(where) else where for why, where in found.items()})
     return {why: where for why, where in reasons.items() if np.any(where)}
+
+
+def _drawn(record: Record) -> bool:
+    """Whether what was found is made of samples."""
+    return not record.methods.isdisjoint(SAMPLERS)
 
 
 def _blamed(found: Shortfalls, record: Record, shape: tuple[int, ...], infinite: Shortfall) -> Shortfalls:

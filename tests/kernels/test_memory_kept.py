@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import numpy as np
+import pytest
+
+import potto
 from potto.kernels import memory
 from potto.kernels.memory import LARGE, MOST, room
 
@@ -27,3 +31,16 @@ def test_no_more_memory_is_kept_than_some() -> None:
     before = list(map(id, memory._blocks))
     room(2 * MOST // 8)
     assert list(map(id, memory._blocks)) == before
+
+
+@pytest.mark.parametrize("body", ["x", "integral [0, 1] x*s d(s)", "integral [0, 1] [s < x] d(s)"])
+def test_answers_are_in_nobody_elses_hands(body: str) -> None:
+    """What is done to an answer changes neither arguments nor its other parts, nor the answers to come."""
+    f, x = potto.grad(potto.compile(f"def f(x) {body}").f, "x"), np.linspace(0.1, 0.9, 1 << 16)
+    given, first = x.copy(), f(x)
+    parts = first.value, first.error, first.tangent, first.tangent_error
+    for number, part in enumerate(parts):
+        part[:] = -1.0 - number
+    assert (x == given).all() and [part[7] for part in parts] == [-1.0, -2.0, -3.0, -4.0]
+    again = f(x)
+    assert (again.value > 0).all() and (again.tangent > 0).all() and (again.error >= 0).all()

@@ -1,17 +1,18 @@
 """Whether an answer is as accurate as was asked for; and if not, why, member by member.
 
-Owns `Shortfalls`, `missed`, `missing`, `precise` and `rounded`. Converged means: the error is within `rtol * |value|`,
-or within `atol`. An answer that is 0 because its parts cancel has no digits that could be relative to it: what its
-error may be then, `allowances` says.
+Owns `Shortfalls`, `Rough`, `missed`, `missing`, `precise` and `rounded`. Converged means: the error is within
+`rtol * |value|`, or within `atol`. An answer that is 0 because its parts cancel has no digits that could be relative to
+it: what its error may be then, `allowances` says.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from msgspec import Struct
 from msgspec.structs import replace
 
 from potto.core.terms import Integral
@@ -30,7 +31,7 @@ from potto.integrate.events import (
     Shortfall,
 )
 from potto.integrate.pieces import Sums, added_up, together
-from potto.kernels.cells import Array, Bools, Number, Value
+from potto.kernels.cells import Array, Bools, Ints, Number, Value
 from potto.projects.settings import Settings
 from potto.runtime.answers.allowances import Allowed, allowance
 
@@ -76,26 +77,70 @@ def missing(term: Integral, sums: Sums, settings: Settings, env: dict[str, Value
 
 
 def precise(numbers: Number | None, errors: Number | None, rtol: float) -> bool:
-    """Whether each number is there, finite and known to this part of it.
-
-    Of many numbers some at a time, whose sizes stay in the cache: in memory they take six times as long.
-    """
+    """Whether each number is there, finite and known to this part of it."""
     if numbers is None or errors is None:
         return False
-    if numbers.__class__ is not np.ndarray or numbers.shape != np.shape(errors):
-        size = np.abs(numbers)
-        return bool(np.all(errors <= rtol * size) and np.all(size < np.inf))
-    flat, off = numbers.reshape(-1), np.reshape(errors, -1)  # copies, where they have gaps: never of large batches
+    if numbers.__class__ is float and errors.__class__ is float:
+        return errors <= rtol * abs(numbers) < np.inf
+    return next(_imprecise(numbers, errors, rtol), None) is None
+
+
+def _imprecise(numbers: Number, errors: Number, rtol: float) -> Iterator[Ints]:
+    """The places of numbers that are not precise, in order: some at a time, whose sizes stay in the cache. In memory
+    they take six times as long."""
+    if np.shape(numbers) != np.shape(errors):
+        numbers, errors = np.broadcast_arrays(numbers, errors)
+    flat, off = np.reshape(numbers, -1), np.reshape(errors, -1)  # copies, where they have gaps: never of large batches
     room = np.empty(min(flat.size, AT_ONCE))
     for start in range(0, flat.size, AT_ONCE):
         some = flat[start : start + AT_ONCE]
         size = np.abs(some, out=room[: some.size])
-        if not size.max() < np.inf:
-            return False
+        finite = size.max() < np.inf
         size *= rtol
-        if not (off[start : start + AT_ONCE] <= size).all():
-            return False
-    return True
+        good = off[start : start + AT_ONCE] <= size
+        if not finite:
+            good &= np.isfinite(some)
+        if not good.all():
+            yield start + np.flatnonzero(~good)
+
+
+class Rough(Struct, frozen=True):
+    """A number, or one of each member of a batch, that is not precise everywhere, with its errors, and the places in
+    the batch, as a row, at which it is not."""
+
+    number: Number
+    error: Number
+    places: Ints
+
+    @property
+    def sizes(self) -> tuple[Array, Array]:
+        """The numbers there without their signs, and their errors."""
+        number, error = np.broadcast_arrays(np.asarray(self.number, dtype=float), np.asarray(self.error, dtype=float))
+        return np.abs(number.take(self.places)), error.take(self.places)
+
+    @property
+    def unknown(self) -> bool:
+        """Whether rules of errors come to no number for one of them."""
+        return bool(np.isnan(self.sizes[1]).any())
+
+    def mask(self, some: Any = slice(None)) -> Any:
+        """A mask of the batch for some of the places; True where there is no batch."""
+        shape = np.broadcast_shapes(np.shape(self.number), np.shape(self.error))
+        found = np.zeros(shape, dtype=bool)
+        found.reshape(-1)[self.places[some]] = True
+        return found
+
+
+def rough_of(pairs: Iterable[tuple[Number, Number]], rtol: float) -> list[Rough]:
+    """Of numbers with their errors those that are not precise."""
+    found = []
+    for number, error in pairs:
+        if number.__class__ is float and precise(number, error, rtol):  # numpy takes its time over a single number
+            continue
+        places = list(_imprecise(number, error, rtol))
+        if places:
+            found.append(Rough(number, error, np.concatenate(places)))
+    return found
 
 
 def rounded(sums: Sums) -> Bools:
@@ -107,31 +152,21 @@ def rounded(sums: Sums) -> Bools:
     return out
 
 
-def missed(value: Any, error: Any, allowed: Allowed, settings: Settings, drawn: bool) -> Shortfalls:
+def missed(rough: Rough, allowed: Allowed, settings: Settings, drawn: bool) -> Shortfalls:
     """Why numbers are not as accurate as was asked for. `drawn`: they are made of samples."""
-    rtol = settings.asked(drawn)
-    if isinstance(value, float) and isinstance(error, float) and error <= rtol * abs(value) < np.inf:
-        return {}
-    if precise(value, error, rtol):
-        return {}
-    v, e = np.broadcast_arrays(np.abs(np.asarray(value, dtype=float)), np.asarray(error, dtype=float))
-    with np.errstate(over="ignore"):
-        fine = np.asarray((e <= rtol * v) & (v < np.inf))
-    if fine.all():
-        return {}
-    bad = np.asarray(~fine)
-    size, off = v[bad], e[bad]  # few of a large batch
-    within = allowed.over(v.shape).of(bad).error(settings.rtol)
-    wrong = ~((off <= settings.atol) | (off <= rtol * size) | (off <= within)) | np.isnan(size)
-    bad[bad] = np.where(np.isinf(size), ~np.isfinite(off), wrong)  # an infinity may be known to be one
+    (size, off), mask = rough.sizes, rough.mask()
+    all_of_it = allowed.over(mask.shape).of(mask)
+    within = all_of_it.error(settings.rtol)
+    known = (off <= settings.atol) | (off <= settings.asked(drawn) * size) | (off <= within)
+    bad = np.where(np.isinf(size), ~np.isfinite(off), ~known | np.isnan(size))  # an infinity may be known to be one
     if not bad.any():
         return {}
     reasons: Shortfalls = {}
-    little = ONLY_ROUNDED * allowed.over(v.shape).added_up(settings.rtol)
-    for reason, holds in _told(v, e, little, drawn):
+    little = ONLY_ROUNDED * all_of_it.added_up(settings.rtol)
+    for reason, holds in _told(size, off, little, drawn):
         here = bad & holds
         if here.any():
-            reasons[reason] = here if v.ndim else True
+            reasons[reason] = rough.mask(here) if mask.ndim else True
             bad = bad & ~here
     return reasons
 

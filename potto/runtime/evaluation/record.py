@@ -120,6 +120,7 @@ class Record(Struct):
     culled: integrals that are 0 for certain, and were not evaluated. seen: such as were answered without a plan.
     cells: on how many stretches roots have been looked for; each counts as an evaluation where a budget is asked.
     isolated: the roots that were found.
+    fresh: whether the arrays of what was found are in nobody else's hands.
     start, members: how much had been done before what counts, and for how many members this is.
     boxes, most_boxes: in how many boxes places have been searched for, and in how many they may be for each member.
     """
@@ -133,6 +134,7 @@ class Record(Struct):
     methods: set[str] = set()
     second: bool = False
     allowed: Allowed = NOTHING
+    fresh: bool = False
     start: int = 0
     members: int = 1
     cells: int = 0

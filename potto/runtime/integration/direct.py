@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from msgspec import Struct
@@ -79,6 +79,7 @@ class Direct(Struct, frozen=True):
     places: tuple[tuple[str, str | Cell], ...]
     dual: bool
     rules: dict[tuple[tuple[Lam, ...], bool], StraightIntegral | None] = {}
+    fresh: ClassVar[bool] = True  # an integral's arrays are made for it
 
     def value(self, machine: Machine, env: Mapping[str, Value]) -> Value | None:
         """The value of the call; None where only the general way has it."""
@@ -285,6 +286,7 @@ class Around(Struct, frozen=True):
     function: Lam
     places: tuple[tuple[str, str | Cell], ...]
     integrals: tuple[Direct, ...]
+    fresh: ClassVar[bool] = False
 
     def value(self, machine: Machine, env: Mapping[str, Value]) -> Value | None:
         """As of `Direct`."""

@@ -18,11 +18,11 @@ from potto.core.terms import Term, function_of, tuple_
 from potto.integrate.columns import distinct
 from potto.integrate.fixed.boxes.sides import UNCLEAR, Box, Sides, sides_of
 from potto.integrate.fixed.boxes.tensor_product import ORDERS, BoxIntegrand, integrated
-from potto.integrate.fixed.lowered.box_text import DONE, Look
+from potto.integrate.fixed.lowered.box_text import Look
 from potto.integrate.fixed.lowered.boxes import LoweredBoxes, Passed
 from potto.integrate.fixed.lowered.cells import places_of
 from potto.integrate.pieces import Evaluator, Sums, gather
-from potto.kernels.cells import Array, Cell, Ints, Value
+from potto.kernels.cells import Cell, Ints, Value
 
 # On how many surfaces sides may depend, and how many integrands there may be, for machine code that decides by itself.
 MOST_SIDES, MOST_FACES = 4, 4
@@ -32,9 +32,9 @@ def uncut(box: Box, machine: Evaluator, env: dict[str, Value], batch: int) -> tu
     """The sums of a batch, and the members that were not integrated here, whose sums are 0; None if none were."""
     able = machine.backend != "numpy" and all(isinstance(env.get(name), Cell) for name in box.names)
     ways = _deciding(box, machine, env) if able else ()
-    passed = _passed(ways, machine, env, batch, ())
+    passed = _passed(ways, machine, env, batch)
     if passed is not None:
-        return _with_left(box, passed, machine, env)
+        return _with_left(box, passed, machine, env, batch)
     with _rented(ways):
         return _by_faces(box, machine, env, batch, able and not ways)
 
@@ -74,11 +74,10 @@ def _of_face(
 ) -> Iterator[tuple[Ints, Sums]]:  # fmt: skip
     """The integrals over those boxes with one integrand that a rule does for."""
     ways = _told(box, face, machine, env) if able else ()
-    passed = (
-        _passed(ways, machine, gather(env, index), index.size, (np.full(index.size, float(DONE)),)) if ways else None
-    )
+    passed = _passed(ways, machine, gather(env, index), index.size) if ways else None
     if passed is not None:
-        yield index[passed.done], passed.sums.pick(passed.done)
+        done = np.delete(np.arange(index.size), passed.left)
+        yield index[done], passed.sums.pick(done)
         index = index[passed.left]
         ways = ()
     if index.size:
@@ -127,9 +126,7 @@ def _ways(
     return () if ways[0].promotion.impossible else ways
 
 
-def _passed(
-    ways: Sequence[LoweredBoxes], machine: Evaluator, env: dict[str, Value], batch: int, sides: Sequence[Array]
-) -> Passed | None:  # fmt: skip
+def _passed(ways: Sequence[LoweredBoxes], machine: Evaluator, env: dict[str, Value], batch: int) -> Passed | None:
     """What functions make of a batch: the next one of those for whom the rule before had too few nodes."""
     passed: Passed | None = None
     for way in ways:
@@ -137,27 +134,29 @@ def _passed(
         if function is None:
             break
         if passed is None:
-            passed = way.run(function, machine, env, batch, sides)
+            passed = way.run(function, machine, env, batch)
         else:
             index = passed.left
-            again = way.run(function, machine, gather(env, index), index.size, [column[index] for column in sides])
+            again = way.run(function, machine, gather(env, index), index.size)
             passed.sums.put(index, again.sums)
-            passed.state[index] = again.state
+            passed.left = index[again.left]
         if not passed.left.size:
             break
     return passed
 
 
-def _with_left(box: Box, passed: Passed, machine: Evaluator, env: dict[str, Value]) -> tuple[Sums, Ints] | None:
+def _with_left(
+    box: Box, passed: Passed, machine: Evaluator, env: dict[str, Value], batch: int
+) -> tuple[Sums, Ints] | None:  # fmt: skip
     """What functions have made of a batch, and what numpy makes of what they left."""
-    sums, done, left = passed.sums, passed.done, passed.left
+    sums, left = passed.sums, passed.left
     if left.size:
         found = _by_faces(box, machine, gather(env, left), left.size, False)
         if found is not None:
             sums = sums.with_members(left, found[0])
-            done[left] = True
-            done[left[found[1]]] = False
-    return (sums, np.nonzero(~done)[0]) if done.any() else None
+            left = left[found[1]]
+    rest = np.sort(np.concatenate((passed.crossed, left)))
+    return (sums, rest) if rest.size < batch else None
 
 
 def _rented(ways: Sequence[LoweredBoxes]) -> AbstractContextManager[None]:

@@ -14,11 +14,10 @@ from functools import reduce
 from msgspec import Struct
 
 from potto.core.terms import Lam, Term, Tuple, children, function_of
-from potto.integrate.fixed.axes import ENDS
+from potto.integrate.fixed.lowered.box_means import BoxMeans
 from potto.integrate.fixed.lowered.formula_text import ParameterPlace, Symbol, still
-from potto.integrate.fixed.lowered.rule_text import RuleText
 from potto.integrate.fixed.straight import StraightIntegral
-from potto.integrate.panels.roundoff import NODE_ROUNDING, WITHIN
+from potto.integrate.panels.roundoff import NODE_ROUNDING
 from potto.integrate.pieces import Evaluator
 from potto.integrate.rules.gauss import EPS, PEAK, gauss
 from potto.integrate.rules.written_intervals import Names, WrittenInterval
@@ -32,6 +31,9 @@ SLOWING = 8
 
 # What became of a member: a surface may cross it, nothing is there to be integrated, it is done, or left to others.
 CROSSED, DARK, DONE, LEFT = range(4)
+# Behind the columns the frame tells how many members are done, crossed and left; where lists of the last two are; then
+# where the rows of results are.
+COUNTS, LISTS, ROWS = 0, 3, 5
 
 
 class Look(Struct, frozen=True):
@@ -39,8 +41,8 @@ class Look(Struct, frozen=True):
 
     bounds: of the variables, a tuple. flat: the surfaces that are affine in each variable, a tuple; curved: the others.
     deciding: of all of them, in this order, those on which it depends what is integrated. faces: what is integrated,
-    each with its sides, as numbers with a bit for each of `deciding`. known: the sides are told by a column: CROSSED,
-    DARK, or from DONE on the number of a face.
+    each with its sides, as numbers with a bit for each of `deciding`. known: the sides of all boxes are those of
+    the one face.
     """
 
     plan: StraightIntegral
@@ -52,12 +54,12 @@ class Look(Struct, frozen=True):
     known: bool = False
 
 
-class BoxText(RuleText):
+class BoxText(BoxMeans):
     """Writes the function, for so many nodes of each variable, which are exact for a polynomial or not.
 
     Rows of results: the integrals of all numbers with their tangents, how far off these are, the most that is added up
-    for values and for tangents, all of them 0 for members that are not done; and what became of the member. The first
-    two constants are the accuracy that is asked for.
+    for values and for tangents, all of them 0 for members that are not done. The first two constants are the accuracy
+    that is asked for.
     """
 
     reserved = 2
@@ -76,14 +78,15 @@ class BoxText(RuleText):
         self.added = [at.room(n * each) for n in self.orders]
         self.most, self.own = ([at.room(1) for _ in range(each)] for _ in range(2))
         self.largest, self.peaks = ([at.room(1) for _ in range(each // self.k1)] for _ in range(2))
-        here, columns = self.parameters(places, self.columns, int(self.look.known))
+        self.tail, self.state = self.columns + sum(place.kind == "array" for place in places), at.room(1)
+        here, _ = self.parameters(places, self.columns)
         ends = self.evaluated(self.look.bounds, here, self.machine)
         if any(end.e is not None or any(x is not None for x in end.t) for end in ends):
             raise NotStraight("bounds that move have boundary terms of their own")
         self.low, self.high = [end.v for end in ends[::2]], [end.v for end in ends[1::2]]
         self.sizes = [at.apply("sub", b, a) for a, b in zip(self.low, self.high, strict=True)]
-        lit = self.told_sides(columns[0]) if self.look.known else self.sides(here)
-        for row in range(rows_of(each) - 1):
+        lit = self.told_sides() if self.look.known else self.sides(here)
+        for row in range(rows_of(each)):
             at.store(self.zero, self.place(row))
         bounds = self.low, self.high, self.sizes  # what is made of them for a face is made where it is lit
         for (face, _), mask in zip(self.look.faces, lit, strict=True):
@@ -102,15 +105,31 @@ class BoxText(RuleText):
                 even = self.even(face, here, self.box)
             self.results(means, self.shares(standing), mask, even)
             at.end()
+        self.list_members()
         return self.end()
+
+    def list_members(self) -> None:
+        """Count the members of a block that are done, and put the others on lists."""
+        at, state, own = self.at, self.at.load(self.state), self.owners()
+        fresh = at.apply("ge", own, self.spread(self.number))
+        done, *others = (at.apply("and", fresh, at.apply("eq", state, at.number(float(code))))
+                         for code in (DONE, CROSSED, LEFT))  # fmt: skip
+        count = at.at("%frame", self.tail + COUNTS, "i64")
+        at.line(f"store i64 {at.whole('add', at.let(f'load i64, ptr {count}'), at.many(done))}, ptr {count}")
+        for number, mask in enumerate(others):
+            place = at.address("%frame", self.tail + LISTS + number, "ptr")
+            self.append(mask, [own], [place], at.at("%frame", self.tail + COUNTS + 1 + number, "i64"))
+
+    def place(self, row: int | str) -> str:
+        """Where the results of a block are in a row."""
+        return self.at.at(self.at.address("%frame", self.tail + ROWS + int(row), "ptr"), self.first, "double")
 
     # Sides
 
-    def told_sides(self, column: str) -> list[str]:
-        """For each face of which members it is the integrand, as a column says; what it says of others is kept."""
-        at = self.at
-        at.store(column, self.state)
-        return [at.apply("eq", column, at.number(float(DONE + n))) for n in range(len(self.look.faces))]
+    def told_sides(self) -> list[str]:
+        """All members are those of the one face."""
+        self.at.store(self.at.number(float(DONE)), self.state)
+        return ["splat (i1 true)"]
 
     def sides(self, env: Mapping[str, Symbol]) -> list[str]:
         """For each face of which members it is the integrand; what became of the others is noted."""
@@ -179,85 +198,7 @@ class BoxText(RuleText):
     def all(self, masks: Sequence[str]) -> str:
         return reduce(lambda a, b: self.at.apply("and", a, b), masks)
 
-    @property
-    def state(self) -> str:
-        """Where it is noted what became of members."""
-        return self.place(rows_of(self.channels) - 1)
-
-    # Nodes
-
-    def mean(self, i: int, env: dict[str, Symbol], outer: str) -> list[str | None]:
-        """The mean values over variable i and those further in. outer: the weight of the node of those further out."""
-        at, each, sums = self.at, self.channels, self.sums[i]
-        n, rows, _, nodes, _, weights, *_ = self.tables[i]
-        j = at.begin(n)
-        weight = at.apply("mul", outer, at.constant(weights, j))
-        node = self.between(i, at.constant(nodes, j))
-        inner = {**env, self.plan.variables[i]: Symbol(node, None, (None,) * (self.k1 - 1), ())}
-        values = self.values(inner, weight) if i + 1 == len(self.sizes) else self.mean(i + 1, inner, weight)
-        moving = self.transformed(i, j, values)
-        row = at.begin(rows)
-        base = at.whole("mul", row, each)
-        for c in moving:
-            where = at.whole("add", base, c)
-            size, place = at.apply("abs", at.load(at.at(sums, where))), at.at(self.added[i], where)
-            at.store(at.apply("add", at.load(place), at.apply("mul", outer, size)), place)
-        at.end()
-        return [at.load(at.at(sums, c)) if c in moving else None for c in range(each)]
-
-    def values(self, env: dict[str, Symbol], weight: str) -> list[str | None]:
-        """The integrand's numbers at a node, each with its tangents. Their sizes are added up, and how far off they are
-        where parameters are."""
-        at = self.at
-        cells = self.evaluated(self.face, env, self.machine)
-        found = [self.plain(x) for cell in cells for x in (cell.v, *(cell.t or (None,) * (self.k1 - 1)))]
-        if len(found) != self.channels:
-            raise NotStraight("a tuple of another size")
-        errors = [x for cell in cells for x in (cell.e, *(cell.et or (None,) * (self.k1 - 1)))]
-        sizes = [None if value is None else at.apply("abs", value) for value in found]
-        for size, room in zip((*sizes, *errors), (*self.most, *self.own), strict=True):
-            if size is not None:
-                at.store(at.apply("add", at.load(room), at.apply("mul", weight, size)), room)
-        for room, size in zip(self.largest, sizes[:: self.k1], strict=True):
-            self.raise_to(room, size or self.zero)
-        return found
-
-    def at_corners(self, i: int, env: dict[str, Symbol]) -> None:
-        """Note the largest sizes at the corners, by loops over the ends of variable i and those further in."""
-        at = self.at
-        end = self.spread(at.begin(str(ENDS)))
-        inner = {**env, self.plan.variables[i]: Symbol(self.between(i, end), None, (), ())}
-        if i + 1 < len(self.sizes):
-            self.at_corners(i + 1, inner)
-        else:
-            for room, cell in zip(
-                self.peaks, self.evaluated(self.face, inner, self.machine.with_directions(0)), strict=True
-            ):
-                self.raise_to(room, self.finite(at.apply("abs", cell.v)))
-        at.end()
-
-    def between(self, i: int, u: str) -> str:
-        """Where variable i is, at a place of [0, 1]."""
-        return self.at.apply("add", self.low[i], self.at.apply("mul", self.sizes[i], u))
-
-    def shares(self, env: Mapping[str, Symbol]) -> list[str | None]:
-        """Which part of each number its own rounding is, by places within, None for 0: see `roundoff.part_of`."""
-        at, machine = self.at, self.machine.with_directions(0).tracking()
-        met = []
-        for part in map(at.number, WITHIN.tolist()):
-            inside = {x: Symbol(self.between(i, part), None, (), ()) for i, x in enumerate(self.plan.variables)}
-            met.append(self.evaluated(self.face, {**env, **inside}, machine))
-        return [self.share(cells) for cells in zip(*met, strict=True)]
-
-    def share(self, cells: Sequence[Symbol]) -> str | None:
-        """The same of one number at these places."""
-        at, off = self.at, self.total(*(cell.e for cell in cells))
-        size = self.total(*(at.apply("abs", cell.v) for cell in cells))
-        if off is None or size is None:
-            return None
-        return at.apply("select", at.apply("gt", off, self.zero), at.apply("div", off, size), self.zero)
-
-    # What they amount to
+    # What nodes amount to
 
     def results(
         self, means: Sequence[str], shares: Sequence[str | None], mask: str, even: Sequence[str]
@@ -358,7 +299,7 @@ class BoxText(RuleText):
 
 def rows_of(channels: int) -> int:
     """How many rows of results there are of so many numbers."""
-    return 2 * channels + 3
+    return 2 * channels + 2
 
 
 def numbers(face: Term) -> int:

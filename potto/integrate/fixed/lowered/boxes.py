@@ -1,24 +1,25 @@
 """Members of a batch that nothing cuts, by machine code: `boxes.uncut` as one function.
 
 Owns `LoweredBoxes` and `Passed`. Eight members at a time the function works out bounds and sides, and applies the rule
-of the integrand that is found there; where all eight are dark, that is all.
+of the integrand that is found there; where all eight are dark, that is all. It puts what it finds where the sums of the
+batch are to be, and who is left on lists, so that nobody goes through all members again.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 from msgspec import Struct, field
 
 from potto.integrate.fixed.axes import axis
-from potto.integrate.fixed.lowered.box_text import CROSSED, DARK, DONE, LEFT, BoxText, Look, numbers, rows_of
+from potto.integrate.fixed.lowered.box_text import COUNTS, BoxText, Look, numbers
 from potto.integrate.fixed.lowered.cells import frame_of, given, parts, whole
 from potto.integrate.fixed.lowered.formula_text import ParameterPlace
 from potto.integrate.fixed.lowered.rule_text import NAME
 from potto.integrate.pieces import Evaluator, Sums
-from potto.kernels.cells import Array, Bools, Ints, Value
+from potto.kernels.cells import Array, Ints, Value
 from potto.kernels.making import counts
 from potto.kernels.memory import room
 from potto.kernels.native.objects import Loaded
@@ -28,27 +29,16 @@ from potto.kernels.native.vectors import LANES
 
 # Members at once: few enough that an interruption is not kept waiting.
 AT_ONCE = 1 << 15
+WORD = 8  # bytes
 
 
-class Passed(Struct, frozen=True):
-    """What a function made of members: their sums, 0 for those that are not done, and what became of each."""
+class Passed(Struct):
+    """What a function made of members: their sums, 0 for those that are not done; those that a surface may cross; and
+    those that nothing crosses, as far as is known, and that are not done."""
 
     sums: Sums
-    state: Array
-
-    @property
-    def done(self) -> Bools:
-        return np.asarray((self.state == DONE) | (self.state == DARK))
-
-    @property
-    def crossed(self) -> Bools:
-        return np.asarray(self.state == CROSSED)
-
-    @property
-    def left(self) -> Ints:
-        """Those that nothing crosses, as far as is known, and that are not done."""
-        found: Ints = np.nonzero(self.state == LEFT)[0]
-        return found
+    crossed: Ints
+    left: Ints
 
 
 class LoweredBoxes(Struct, frozen=True):
@@ -68,24 +58,41 @@ class LoweredBoxes(Struct, frozen=True):
 
         return self.promotion.function(machine.backend, text)
 
-    def run(
-        self, function: Loaded, machine: Evaluator, env: Mapping[str, Value], batch: int, sides: Sequence[Array]
-    ) -> Passed:  # fmt: skip
-        """The integrals of a batch; sides: a column of them, if they are told."""
-        m, k1 = numbers(self.look.faces[0][0]) if self.look.faces else 1, 1 + machine.directions
+    def run(self, function: Loaded, machine: Evaluator, env: Mapping[str, Value], batch: int) -> Passed:
+        """The integrals of a batch."""
         constants, arrays = given(self.places, env)
         constants = np.concatenate(([0.5 * machine.rtol, 0.5 * machine.atol], constants))
         axes = [axis(order, tuple(range(order)), (False, False), True) for order in self.orders]
         least = max(batch, LANES)
-        out = room(rows_of(m * k1), least)
-        columns = [whole(column, least) for column in (*arrays, *sides)]
+        m = numbers(self.look.faces[0][0]) if self.look.faces else 1
+        sums, rows = _sums_of(m, machine.directions, least)
+        columns, lists = [whole(column, least) for column in arrays], np.empty((2, AT_ONCE + 3 * LANES), dtype=np.int64)
+        head = frame_of(rows[0][None], axes, [])
+        tail = head.size + len(columns) + COUNTS
+        frame = np.array([*head, *map(address, columns), 0, 0, 0, *map(address, (*lists, *rows))], dtype=np.int64)
+        steps = np.zeros_like(frame)  # of where things are, from member to member
+        steps[head.size : tail] = steps[frame.size - len(rows) :] = WORD
+        done, found = 0, ([np.zeros(0, dtype=np.int64)], [np.zeros(0, dtype=np.int64)])
         for start, stop in parts(least, AT_ONCE):
-            frame = frame_of(out[:, start:stop], axes, [column[start:stop] for column in columns])
-            function.call(address(frame), address(constants))
-        found = out[:, :batch]
-        state = found[-1]
-        evaluations = int(np.count_nonzero(state >= DONE)) * math.prod(self.orders)
-        machine.count(evaluations)
-        counts.native_points += evaluations
-        total, bound = found[: 2 * m * k1].reshape(2, m, k1, batch)
-        return Passed(Sums(total[:, 0], bound[:, 0], total[:, 1:], bound[:, 1:], gross=found[-3:-1]), state)
+            here = frame + steps * start
+            here[0] = stop - start
+            function.call(address(here), address(constants))
+            own, *others = here[tail : tail + 3].tolist()
+            done += own
+            for known, members, count in zip(found, lists, others, strict=True):
+                known.append(members[:count] + start)
+        machine.count(done * math.prod(self.orders))
+        counts.native_points += done * math.prod(self.orders)
+        crossed, left = (np.concatenate(known) for known in found)
+        if batch < least:
+            sums, crossed, left = sums.pick(slice(batch)), crossed[crossed < batch], left[left < batch]
+        return Passed(sums, crossed, left)
+
+
+def _sums_of(m: int, k: int, batch: int) -> tuple[Sums, list[Array]]:
+    """Sums that are yet to be written, and their rows in the order of a function: numbers with their tangents, errors
+    of these, and what is added up. Each part has memory of its own, as some live longer than others."""
+    v, e, t, et = (room(*shape, batch) for shape in ((m,), (m,), (m, k), (m, k)))
+    gross = room(2, batch)
+    rows = [row for number, slopes in ((v, t), (e, et)) for i in range(m) for row in (number[i], *slopes[i])]
+    return Sums(v, e, t, et, gross=gross), [*rows, *gross]

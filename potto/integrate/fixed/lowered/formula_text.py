@@ -191,6 +191,23 @@ class FormulaText:
         self.at.store(self.zero, self.at.at(memory, i))
         self.at.end()
 
+    def owners(self) -> str:
+        """The numbers of the members of a block."""
+        lanes = ", ".join(f"double {float(lane)}" for lane in range(self.at.lanes))
+        return self.at.apply("add", self.spread(self.first), f"<{lanes}>")
+
+    def append(self, there: str, numbers: Sequence[str], places: Sequence[str], counted: str) -> None:
+        """Put whole numbers of the members of a mask behind those that are there already. places: where each list
+        begins. counted: where it is told how long they are."""
+        at = self.at
+        at.begin("1", at.any(there))
+        found = at.let(f"load i64, ptr {counted}")
+        for place, number in zip(places, numbers, strict=True):  # the next ones take the place of those not in the mask
+            whole = at.once(f"fptosi {at.doubles} {number} to {at.whole_numbers}", number)
+            at.store_wholes(at.those(whole, there), at.at(place, found, "i64"))
+        at.line(f"store i64 {at.whole('add', found, at.many(there))}, ptr {counted}")
+        at.end()
+
     def raise_to(self, place: str, value: str) -> None:
         self.at.store(self.at.apply("max", self.at.load(place), value), place)
 

@@ -163,19 +163,16 @@ class RuleText(RowText):
         number = [at.load(at.at(self.sums[i], c)) if c in moving else None for c in range(k1)]
         return self.product(number, width)
 
-    def transformed(self, i: int, j: str, values: Sequence[str | None]) -> list[int]:
+    def transformed(self, i: int, j: str, values: Sequence[str | None], after: Sequence[str | None] = ()) -> list[int]:
         """End the loop over the nodes j of variable i, where these are the values, with the coefficients along it, put
-        where sums are, of those that are not None; which these are."""
+        where sums are, of those that are not None; which these are. after: as of `Vectors.end`."""
         at = self.at
         n, rows, _, _, _, _, transform, _, _ = self.tables[i]
-        moving = [c for c, x in enumerate(values) if x is not None]
+        moving = self.put_by(i, j, values, after)
 
         def kept(j: str, slot: int) -> str:
             return at.at(self.kept[i], at.whole("add", at.whole("mul", j, len(moving)), slot))
 
-        for slot, c in enumerate(moving):
-            at.store(values[c] or self.zero, kept(j, slot))
-        at.end()
         row = at.begin(rows)
         j, sums = at.adding(n, len(moving))
         factor = at.constant(transform, at.whole("add", at.whole("mul", j, rows), row))
@@ -184,6 +181,15 @@ class RuleText(RowText):
         for c, x in zip(moving, sums, strict=True):
             at.store(x, at.at(self.sums[i], at.whole("add", at.whole("mul", row, self.channels), c)))
         at.end()
+        return moving
+
+    def put_by(self, i: int, j: str, values: Sequence[str | None], after: Sequence[str | None]) -> list[int]:
+        """End the loop over the nodes j of variable i, with the values that are not None kept; which these are."""
+        at, moving = self.at, [c for c, x in enumerate(values) if x is not None]
+        first = at.whole("mul", j, len(moving))
+        for slot, c in enumerate(moving):
+            at.store(values[c] or self.zero, at.at(self.kept[i], at.whole("add", first, slot)))
+        at.end(*after)
         return moving
 
     def coefficients(self, i: int, volume: Dual, moving: Sequence[int]) -> None:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from functools import cached_property
 
 import numpy as np
 from msgspec import Struct, field
@@ -50,7 +51,7 @@ class Found(Struct, frozen=True):
         return Found(plain, between, owners, sides)
 
 
-class LoweredTopologies(Struct, frozen=True):
+class LoweredTopologies(Struct, frozen=True, dict=True, eq=False):
     """The function for parameters with these parts."""
 
     plan: StraightIntegral
@@ -61,12 +62,12 @@ class LoweredTopologies(Struct, frozen=True):
         """The function, if it is to be used now. machine: one that keeps track of rounding, without directions."""
         return self.promotion.function(machine.backend, lambda: TopologyText(self.plan, machine).text(self.places))
 
-    @property
+    @cached_property
     def most(self) -> int:
         """How many cells a member may have."""
         return math.prod(len(items) - 1 for items in self.plan.items)
 
-    @property
+    @cached_property
     def dear(self) -> bool:
         """Whether a rule goes through rows one by one: then cells between the same ones had better be neighbours."""
         return any(len(postorder(item)) >= DEAR for items in self.plan.items for item in items)

@@ -20,7 +20,6 @@ from potto.integrate.fixed.straight import CLEAR, ROW_BITS, StraightIntegral
 from potto.integrate.pieces import Evaluator
 from potto.kernels.native.elementary import module
 from potto.kernels.native.operations import NotStraight
-from potto.kernels.native.vectors import LANES
 
 NAME = "topology"
 # Numbers of the frame: how many members are worked out, how many there are, how many cells were found; then where it is
@@ -68,10 +67,9 @@ class TopologyText(FormulaText):
         self.block()
         self.sure = at.at(at.address("%frame", PLAIN, "ptr"), self.first, "double")
         here, _ = self.parameters(places, HEAD)
-        lanes = ", ".join(f"double {float(lane)}" for lane in range(LANES))
-        self.owners = at.apply("add", self.spread(self.first), f"<{lanes}>")
-        fresh = at.apply("ge", self.owners, self.spread(self.number))
-        self.fresh = at.apply("and", fresh, at.apply("lt", self.owners, self.spread(at.address("%frame", THERE))))
+        self.own = self.owners()
+        fresh = at.apply("ge", self.own, self.spread(self.number))
+        self.fresh = at.apply("and", fresh, at.apply("lt", self.own, self.spread(at.address("%frame", THERE))))
         at.store(self.one, self.sure)
         self.over(0, here, "splat (i1 true)", self.zero)
         at.end()
@@ -180,26 +178,17 @@ class TopologyText(FormulaText):
             self.only(there, at.apply("gt", at.apply("abs", cell.v), self.near(cell)))
             above = at.apply("select", at.apply("gt", cell.v, self.zero), at.number(float(1 << bit)), self.zero)
             sides = at.apply("add", sides, above)
-        self.put(at.apply("and", there, self.fresh), (self.owners, between, sides))
+        self.put(at.apply("and", there, self.fresh), (self.own, between, sides))
 
     def put(self, there: str, values: Sequence[str]) -> None:
         """Put down whose a cell is, between which rows, and on which sides, for a mask of members."""
         at = self.at
-        numbers = [at.once(f"fptosi {at.doubles} {value} to {at.whole_numbers}", value) for value in values]
         if self.lit is not None:
-            shifted = f"lshr {at.whole_numbers} splat (i64 {self.lit}), {numbers[-1]}"
-            lit = at.once(f"trunc {at.whole_numbers} {at.once(shifted, numbers[-1])} to {at.masks}", numbers[-1])
-            there = at.apply("and", there, lit)
-        at.begin("1", at.any(there))
-        counted = at.at("%frame", FOUND, "i64")
-        places, found = (
-            [at.address("%frame", slot, "ptr") for slot in (OWNERS, BETWEEN, SIDES)],
-            at.let(f"load i64, ptr {counted}"),
-        )
-        for place, number in zip(places, numbers, strict=True):  # the next ones take the place of those not in the mask
-            at.store_wholes(at.those(number, there), at.at(place, found, "i64"))
-        at.line(f"store i64 {at.whole('add', found, at.many(there))}, ptr {counted}")
-        at.end()
+            sides = at.once(f"fptosi {at.doubles} {values[-1]} to {at.whole_numbers}", values[-1])
+            shifted = at.once(f"lshr {at.whole_numbers} splat (i64 {self.lit}), {sides}", sides)
+            there = at.apply("and", there, at.once(f"trunc {at.whole_numbers} {shifted} to {at.masks}", shifted))
+        places = [at.address("%frame", slot, "ptr") for slot in (OWNERS, BETWEEN, SIDES)]
+        self.append(there, values, places, at.at("%frame", FOUND, "i64"))
 
     def surfaces(self, env: Env) -> list[Symbol]:
         surfaces = self.plan.surfaces
