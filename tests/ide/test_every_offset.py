@@ -4,6 +4,8 @@ nothing outside of it. `make fuzz` asks at every offset, `make test` here and th
 from __future__ import annotations
 
 import random
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
@@ -26,14 +28,28 @@ def unchanged() -> Library:
     return Library([EXAMPLES])
 
 
-def opened(name: str, text: str | None = None) -> tuple[Library, str, str]:
-    library = unchanged() if text is None else Library([EXAMPLES])
+@cache
+def edited() -> Library:
+    """One whose texts are broken and put right again one after the other, as by an editor."""
+    return Library([EXAMPLES])
+
+
+def opened(name: str) -> tuple[Library, str, str]:
+    library = unchanged()
     file = library.files.open(EXAMPLES / name)
-    if text is not None:
-        library.files.set_text(file, text)
     found = library.source(file)
     assert found is not None
     return library, file, found.text
+
+
+@contextmanager
+def broken(name: str, rng: random.Random) -> Iterator[tuple[Library, str, str]]:
+    library, path = edited(), EXAMPLES / name
+    file, original = library.files.open(path), path.read_text(encoding="utf-8")
+    text = mutated(original, rng)
+    library.files.set_text(file, text)
+    yield library, file, text
+    library.files.set_text(file, original)
 
 
 def ask_everything(library: Library, file: str, text: str, offsets) -> None:
@@ -163,17 +179,14 @@ def mutated(text: str, rng: random.Random) -> str:
 @pytest.mark.parametrize("seed", range(len(FILES)))
 def test_every_feature_on_broken_text(seed: int) -> None:
     rng = random.Random(seed)
-    name = FILES[seed]
-    original = (EXAMPLES / name).read_text(encoding="utf-8")
-    library, file, text = opened(name, mutated(original, rng))
-    ask_everything(library, file, text, sorted(rng.sample(range(len(text) + 1), min(examples(12, 40), len(text) + 1))))
+    with broken(FILES[seed], rng) as (library, file, text):
+        places = rng.sample(range(len(text) + 1), min(examples(12, 40), len(text) + 1))
+        ask_everything(library, file, text, sorted(places))
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(100, 100 + examples(12, 60)))
 def test_every_feature_on_many_broken_texts(seed: int) -> None:
     rng = random.Random(seed)
-    name = rng.choice(FILES)
-    original = (EXAMPLES / name).read_text(encoding="utf-8")
-    library, file, text = opened(name, mutated(original, rng))
-    ask_everything(library, file, text, sorted(rng.sample(range(len(text) + 1), min(150, len(text) + 1))))
+    with broken(rng.choice(FILES), rng) as (library, file, text):
+        ask_everything(library, file, text, sorted(rng.sample(range(len(text) + 1), min(150, len(text) + 1))))
