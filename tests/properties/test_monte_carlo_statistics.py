@@ -154,7 +154,7 @@ def test_what_nothing_is_drawn_for_is_as_good_as_its_rounding(method: Literal["m
 @pytest.mark.parametrize("method", ["mc", "qmc"])
 @pytest.mark.parametrize("problem", PROBLEMS, ids=lambda p: p.name)
 def test_reported_errors_cover_what_is_wrong(problem: Problem, method: str) -> None:
-    count = examples(200)
+    count = examples(120)
     seeds = range(count) if method == "mc" else range(0, 200 * count, 1_000)
     values, tangents = scores(problem, method, seeds)
     for found in (values, tangents):
@@ -162,7 +162,7 @@ def test_reported_errors_cover_what_is_wrong(problem: Problem, method: str) -> N
             continue
         missed = sum(abs(z) > SIGMAS for z in found)
         # A normal number is beyond 4 standard deviations once in 16,000 times, and bars of qmc are as wide in terms of
-        # Student's t: two such out of 1,000 have a probability of 2e-3.
+        # Student's t: two such out of 1,000 have a probability of 2e-3, two out of these 3e-5.
         assert missed <= 1, (missed, len(found))
         if method == "mc":
             assert abs(np.mean(found)) < 4 / math.sqrt(len(found)), found
