@@ -6,14 +6,11 @@ STAMP := $(VENV)/.stamp
 VSCODE := editors/vscode
 EXTRAS ?= dev
 
-# What .venv-native has from .venv.
-SHARED := 'import sysconfig; p = sysconfig.get_path("purelib"); open(p + "/shared.pth", "w").write(p.replace(".venv-native", "$(VENV)"))'
-
 TORCH ?= torch==2.13.0
 WORKERS ?= auto
 TESTS := $(BIN)/python -m pytest -n $(WORKERS) --maxprocesses 8 --dist worksteal --durations 20
 
-.PHONY: tables docs wheels demo gallery test quick fuzz lint check format clean native machine-code pictures test-bridges hours vsix e2e
+.PHONY: tables docs wheels demo gallery test quick fuzz lint check format clean pictures test-bridges hours vsix e2e
 
 demo: $(STAMP)  ## the paper's programs, evaluated and differentiated
 	@PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/python examples/demo.py
@@ -51,13 +48,6 @@ check: lint  ## lints, types, floors
 tables: $(STAMP)  ## potto/syntax/tables.json: what the parser reads, of the grammar as it is now
 	$(BIN)/python -c 'from potto.syntax.tables import write; write()'
 
-native: $(STAMP) machine-code  ## .venv-native: the front end as machine code (needs a C compiler), with all else of .venv
-
-machine-code:
-	test -x .venv-native/bin/python || $(PYTHON) -m venv .venv-native
-	.venv-native/bin/python -c $(SHARED)
-	HATCH_BUILD_HOOKS_ENABLE=1 .venv-native/bin/python -m pip install -qq --disable-pip-version-check --no-deps --force-reinstall .
-
 docs: $(STAMP)  ## the pages as a site in build/site: links and anchors checked, their programs run
 	$(BIN)/python -c 'import material' 2>/dev/null || $(BIN)/python -m pip install -qq --disable-pip-version-check -e '.[docs]'
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet --strict
@@ -81,7 +71,7 @@ format: $(STAMP)  ## what ruff can put right by itself
 
 clean:  ## start over
 	rm -rf $(VSCODE)/node_modules $(VSCODE)/e2e/node_modules $(VSCODE)/dist
-	rm -rf $(VENV) .venv-native .mypy_cache .pytest_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) .mypy_cache .pytest_cache .ruff_cache .hypothesis
 
 $(STAMP): pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "Potto needs Python 3.11 or newer; try make PYTHON=python3.11"; exit 1; }

@@ -1,15 +1,12 @@
 """What an installation leaves behind, so that processes are timed as users have them.
 
-Owns `as_installed` and `front_end`. pip compiles what it installs, but not a working copy that is used where it stands.
+Owns `as_installed`. pip compiles what it installs, but not a working copy that is used where it stands.
 """
 
 from __future__ import annotations
 
 import compileall
 from pathlib import Path
-
-from potto.query import Database
-from potto.quick import is_compiled
 
 PACKAGES = ("potto", "lsp/potto_lsp", "repl/potto_repl")
 
@@ -18,8 +15,3 @@ def as_installed() -> None:
     """Compile the packages, as far as they are not."""
     for package in PACKAGES:
         compileall.compile_dir(Path(__file__).parent.parent / package, quiet=1)
-
-
-def front_end() -> str:
-    """What the front end that is measured is made of."""
-    return "machine code" if is_compiled(Database) else "interpreted (`make native` compiles it)"

@@ -17,12 +17,11 @@ import argparse
 import json
 import random
 import statistics
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from installed import as_installed, front_end
+from installed import as_installed
 from lsp_client import PUSHED, Client
 from lsp_peers import COLUMNS, compare
 from lsp_typing import type_like_a_person
@@ -236,7 +235,6 @@ def main() -> None:
     parser.add_argument("--plot", type=Path, metavar="FILE", help="draw what a key costs against the lines of the file")
     arguments = parser.parse_args()
     as_installed()
-    print(f"front end: {front_end()}", file=sys.stderr)
     rounds = 20 if arguments.quick else 200
     if arguments.arrays:
         plain = list(rows_of(workspace(), rounds))

@@ -15,7 +15,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from installed import front_end
 from lsp_workspace import longer, resigned, workspace
 from potto_lsp import memory
 from potto_lsp.analysis import Analysis
@@ -111,7 +110,7 @@ def main() -> None:
         show(
             "the same, of types that never were there before", lambda n: session.edit("m0", longer(leaf, n), set(users))
         )
-        print(f"front end: {front_end()}; load {os.getloadavg()[0]:.1f} of {os.cpu_count()} processors")
+        print(f"load {os.getloadavg()[0]:.1f} of {os.cpu_count()} processors")
 
 
 if __name__ == "__main__":

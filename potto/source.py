@@ -11,11 +11,10 @@ import bisect
 from dataclasses import dataclass
 from functools import cached_property
 
-from potto.quick import quick, value
+from msgspec import Struct
 
 
-@value
-class Span:
+class Span(Struct, frozen=True):
     """A half-open range `[start, end)` of code points. Ten thousand are made for 2,000 lines, and most are compared."""
 
     start: int
@@ -43,8 +42,7 @@ class Span:
 NOWHERE = Span(0, 0)
 
 
-@value
-class Position:
+class Position(Struct, frozen=True):
     """A zero-based line and a column in code points."""
 
     line: int
@@ -93,6 +91,3 @@ class SourceText:
         """The column in UTF-16 code units, which editors count in."""
         head = self.line(position.line)[: position.column]
         return len(head) + sum(1 for char in head if ord(char) > 0xFFFF)
-
-
-quick(Span, Position)

@@ -10,7 +10,8 @@ import itertools
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
-from potto.quick import quick, value
+from msgspec import Struct
+
 from potto_lsp import convert, protocol
 from potto_lsp.text import DocumentText
 from potto_lsp.uris import to_uri
@@ -26,8 +27,7 @@ TOGETHER = 20  # closed files per step
 Notify = Callable[[str, Any], None]
 
 
-@value
-class Report:
+class Report(Struct, frozen=True):
     """What there is to say about a file, as messages. The same `id` means the same messages.
 
     found: what the checks have said, and what others have.
@@ -177,6 +177,3 @@ class Publisher:
             if items or project.folder in self._wrong_projects:
                 self._publish(to_uri(project.path), items, None)
         self._wrong_projects = {project.folder for project in projects if project.problems}
-
-
-quick(Report)

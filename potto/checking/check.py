@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from msgspec.structs import replace
+
 from potto.calculus.checking.diffeo import check_conditions
 from potto.diagnostics import Diagnostic, Related
 from potto.modules import chunk_start, module_diagnostics, statements
@@ -15,7 +17,6 @@ from potto.modules.graph import Run, name_runs
 from potto.modules.misread import moved, piece_diagnostics, syntax_diagnostics
 from potto.modules.texts import StatementRef, is_diffeo, piece
 from potto.query import Database, query
-from potto.quick import replace
 from potto.reports.render import Located
 from potto.types import check_definition, check_statement, interface
 

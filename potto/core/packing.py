@@ -25,7 +25,6 @@ from potto.core.consing import Base, own_fields
 from potto.core.rebuilding import rebuilt
 from potto.core.walking import unknown
 from potto.diagnostics import KINDS, Kind
-from potto.quick import is_compiled
 
 _TUPLE, _LIST, _SET, _DICT, _TERM, _STRUCT, _KIND, _FRACTION, _INTEGER, _FOUND = range(10)
 _PLAIN = frozenset((type(None), bool, float, str, bytes))
@@ -175,7 +174,7 @@ def _is_data(cls: type) -> bool:
     """Whether values of a class are made of its fields, and compared by them."""
     if issubclass(cls, Struct | tuple):
         return cls is not tuple
-    return (is_dataclass(cls) or is_compiled(cls)) and cls.__eq__ is not object.__eq__
+    return is_dataclass(cls) and cls.__eq__ is not object.__eq__
 
 
 def _fields(cls: Any) -> tuple[str, ...]:

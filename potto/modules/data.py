@@ -8,16 +8,16 @@ from __future__ import annotations
 
 import os.path
 
+from msgspec import Struct
+
 from potto.data.mistakes import UNREADABLE, DataMistake
 from potto.data.values import Shape
 from potto.query import Database, query
-from potto.quick import quick, value
 
 _NO_FILES = "it is a text by itself, without a folder: save it in a file, or give the data as an argument"
 
 
-@value
-class DataFile:
+class DataFile(Struct, frozen=True):
     """A file of data as it was read: where it is, the digest of its content, and what it holds."""
 
     path: str
@@ -36,6 +36,3 @@ def data_file(db: Database, file: str, written: str) -> DataFile | DataMistake:
     path = path_of(file, written)
     found: DataFile | DataMistake | None = db.get_input(("data", path))
     return found if found is not None else DataMistake(UNREADABLE, "this program cannot read files", hint=_NO_FILES)
-
-
-quick(DataFile)

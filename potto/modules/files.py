@@ -17,21 +17,21 @@ import stat
 from collections.abc import Hashable, Iterable
 from pathlib import Path
 
+from msgspec import Struct
+
 from potto.data.mistakes import DataMistake
 from potto.modules.data import DataFile
 from potto.modules.folders import Programs, list_folder
 from potto.modules.lookup import SUFFIXES
 from potto.modules.texts import Unreadable
 from potto.query import Database
-from potto.quick import quick, value
 
 MAX_BYTES = 16_000_000
 DISK, OPEN = 1, 0
 Stamp = tuple[int, int, int] | None
 
 
-@value
-class ReadFile:
+class ReadFile(Struct, frozen=True):
     """A file as it was read, and how to see that it changed since."""
 
     content: str | Unreadable | None
@@ -244,6 +244,3 @@ def load_file(db: Database, path: str | os.PathLike[str]) -> str:
 
 def _reason(error: Exception) -> str:
     return error.strerror or str(error) if isinstance(error, OSError) else str(error)
-
-
-quick(ReadFile)

@@ -9,18 +9,17 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from potto.quick import quick, value
+from msgspec import Struct
+
 from potto.syntax import nodes
 from potto.syntax.nodes import Expr, Item, Node, Statement
 
 
-@value
-class _Bind:
+class _Bind(Struct, frozen=True):
     names: tuple[str, ...]
 
 
-@value
-class _Unbind:
+class _Unbind(Struct, frozen=True):
     names: tuple[str, ...]
 
 
@@ -28,8 +27,7 @@ Reference = tuple[str | None, str]
 _Step = Node | Statement | _Bind | _Unbind
 
 
-@value
-class References:
+class References(Struct, frozen=True):
     """What a piece of syntax refers to: `(None, name)` or `(path, name)`, in the order of the text, each once. With
     those that it only calls, all arguments by their places, is nothing else done."""
 
@@ -225,6 +223,3 @@ _STEPS: dict[type, Callable[[Any], Sequence[_Step]]] = {
     nodes.ExpressionStatement: lambda node: (node.value,),
     nodes.For: lambda node: (node.iterable, *_scoped((node.variable.name,), _statements(node.body))),
 }
-
-
-quick(_Bind, _Unbind, References)

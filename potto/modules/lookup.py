@@ -12,9 +12,10 @@ import os.path
 from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
+from msgspec import Struct
+
 from potto.modules.texts import exists, imports, names
 from potto.query import Database, query
-from potto.quick import quick, value
 from potto.syntax import nodes
 
 SUFFIXES = (".po", ".diffeo")
@@ -27,8 +28,7 @@ class DefinitionTarget(NamedTuple):
     name: str
 
 
-@value
-class ModuleTarget:
+class ModuleTarget(Struct, frozen=True):
     """A module: its file, and how it was written."""
 
     file: str
@@ -38,21 +38,18 @@ class ModuleTarget:
 Target = DefinitionTarget | ModuleTarget
 
 
-@value
-class ImportBinding:
+class ImportBinding(Struct, frozen=True):
     """What an import binds a name to: `name` of `module`, or the module itself."""
 
     module: str
     name: str | None
 
 
-@value
-class DefinitionBinding:
+class DefinitionBinding(Struct, frozen=True):
     """What a definition of the file itself binds a name to."""
 
 
-@value
-class FoundModule:
+class FoundModule(Struct, frozen=True):
     """The file that a module name means, and another one that it could mean as well."""
 
     file: str
@@ -148,8 +145,7 @@ def written_names(item: nodes.FromImport) -> tuple[nodes.ImportedName, ...]:
     return tuple(imported for imported in item.names if imported.name)
 
 
-@value
-class Trail:
+class Trail(Struct, frozen=True):
     """Where the search for a name went, file by file, and what it found. `circular`: it came back to where it was."""
 
     target: Target | None
@@ -219,6 +215,3 @@ def resolve_module(db: Database, file: str, path: str) -> str | None:
         else:
             return None
     return at
-
-
-quick(ModuleTarget, ImportBinding, DefinitionBinding, FoundModule, Trail)

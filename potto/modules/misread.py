@@ -6,10 +6,11 @@ that an edit above it says nothing anew.
 
 from __future__ import annotations
 
+from msgspec.structs import replace
+
 from potto.diagnostics import Diagnostic
 from potto.modules.texts import groups_of_pieces, is_diffeo, parsed, piece
 from potto.query import Database, query
-from potto.quick import replace
 
 
 @query(travels=True)

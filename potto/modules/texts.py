@@ -12,12 +12,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from itertools import accumulate
-from typing import Any, Literal
+from typing import Literal
+
+from msgspec import Struct
+from msgspec.structs import replace
 
 from potto.modules.free import References, references_in
 from potto.modules.grouping import grouped
 from potto.query import Database, Parted, query
-from potto.quick import quick, replace, value
 from potto.source import SourceText, Span
 from potto.syntax import Chunk, ParsedChunk, defined_name, nodes, parse_chunk, split
 from potto.syntax import pieces as cut
@@ -26,8 +28,7 @@ Importing = nodes.FromImport | nodes.Import
 GROUP, MOST_OF_GROUP = 8, 24  # pieces in the mean, and at most
 
 
-@value
-class Unreadable:
+class Unreadable(Struct, frozen=True):
     """A file that is there but has no text for us. `offset` counts bytes (for "not text")."""
 
     reason: Literal["folder", "not a file", "not text", "too large", "no access"]
@@ -38,8 +39,7 @@ class Unreadable:
 ChunkRef = Chunk
 
 
-@value
-class StatementRef:
+class StatementRef(Struct, frozen=True):
     """A top-level statement of a script; its spans are relative to `start`. broken: the parser had to guess at it."""
 
     start: int
@@ -47,8 +47,7 @@ class StatementRef:
     broken: bool = False
 
 
-@value
-class Head:
+class Head(Struct, frozen=True):
     """What others need to know of a chunk without its tree. `importing` has spans relative to the chunk."""
 
     kind: Literal["blank", "import", "definition", "statement", "broken"]
@@ -57,16 +56,14 @@ class Head:
     importing: Importing | None = None
 
 
-@value
-class DefinitionPlace:
+class DefinitionPlace(Struct, frozen=True):
     """The chunk that defines a name; `span` is the name's, relative to the chunk."""
 
     start: int
     span: Span
 
 
-@value
-class Piece:
+class Piece(Struct, frozen=True):
     """Some neighbouring chunks by what they are; all positions are relative to the piece. The last place of a name is
     that of the chunk in `texts`."""
 
@@ -80,8 +77,7 @@ class Piece:
     nameless: bool
 
 
-@value
-class FileLayout:
+class FileLayout(Struct, frozen=True):
     """A file in pieces, the place where each starts, and the piece that has the definition of a name which counts."""
 
     pieces: tuple[Piece, ...]
@@ -195,8 +191,7 @@ def chunk_references(db: Database, text: str, diffeo: bool) -> References:
     return References() if item is None else references_in(item)
 
 
-@value
-class FileOutline:
+class FileOutline(Struct, frozen=True):
     """What of a file's layout no body edit and no move changes. `nameless`: a broken chunk might define anything."""
 
     names: tuple[str, ...]
@@ -277,9 +272,7 @@ def names(db: Database, file: str) -> tuple[str, ...]:
 
 def chunk_text(db: Database, file: str, name: str) -> str | None:
     """The text of the chunk that defines `name`; the last one if there are several."""
-    table: Any = texts  # mypyc takes what is in a table of parts for None
-    found: str | None = db.entry(table, (file,), name)
-    return found
+    return db.entry(texts, (file,), name)
 
 
 def chunk_start(db: Database, file: str, name: str) -> int:
@@ -384,6 +377,3 @@ def import_starts(db: Database, file: str) -> tuple[int, ...]:
     """Where the chunks of `imports` start."""
     found = layout(db, file)
     return tuple([start + one.start for piece, start in zip(found.pieces, found.starts) for one in piece.imports])
-
-
-quick(Head, DefinitionPlace, Piece, Unreadable, StatementRef, FileLayout, FileOutline)

@@ -10,10 +10,11 @@ import os.path
 import re
 from collections.abc import Callable, Iterator
 
+from msgspec import Struct
+
 from potto.modules.lookup import SUFFIXES, bindings, find_module, folders
 from potto.modules.texts import chunk_references, chunks, content, imports, is_diffeo, names
 from potto.query import Database, query
-from potto.quick import quick, value
 from potto.syntax import nodes
 
 _HEADS = re.compile(
@@ -60,8 +61,7 @@ def _table(db: Database, words: Callable[[str], frozenset[str]]) -> dict[str, li
     return table
 
 
-@value
-class _Words:
+class _Words(Struct, frozen=True):
     """Words of a file by where they stand: where a definition's name does, and in imports."""
 
     defined: frozenset[str]
@@ -121,6 +121,3 @@ def _members(db: Database, file: str) -> frozenset[tuple[str, str]]:
     diffeo = is_diffeo(file)
     found = (reference for chunk in chunks(db, file) for reference in chunk_references(db, chunk.text, diffeo).every)
     return frozenset((path, name) for path, name in found if path is not None)
-
-
-quick(_Words)

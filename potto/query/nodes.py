@@ -6,7 +6,7 @@ import sys
 from collections.abc import Callable, Hashable, Iterable, Mapping
 from typing import Any, Final, Literal
 
-from potto.quick import quick, value
+from msgspec import Struct
 
 DURABILITIES: Final = 3  # of inputs: 0, 1, 2; this one is for memos that read no input
 FOREVER: Final = sys.maxsize  # the revision up to which such a memo counts as verified
@@ -27,8 +27,7 @@ class CycleError(Exception):
     """A query needs its own answer and has no fallback. An internal error; its text shows the cycle."""
 
 
-@value
-class QueryEvent:
+class QueryEvent(Struct, frozen=True):
     """What happened to a query or input (`query` is then "input"). `reused`: verified after an edit without a run."""
 
     kind: Literal["executed", "reused", "input"]
@@ -36,8 +35,7 @@ class QueryEvent:
     args: tuple[Hashable, ...]
 
 
-@value
-class Parted:
+class Parted(Struct, frozen=True):
     """A mapping made of parts, as the answer of a query that runs after every edit. Parts shared with the previous
     answer are skipped when the two are compared. `place` says which part holds a key."""
 
@@ -329,6 +327,3 @@ def short(value: object) -> str:
     """A value, shortened for a log."""
     text = repr(value)
     return text if len(text) <= 60 else f"{text[:40]}...{text[-16:]}"
-
-
-quick(QueryEvent, Parted)

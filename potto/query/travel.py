@@ -16,10 +16,11 @@ from collections.abc import Callable, Hashable, Sequence
 from importlib import import_module
 from typing import Any
 
+from msgspec import Struct
+
 from potto.digests import blake2b
 from potto.query.database import Database
 from potto.query.nodes import GONE, Input, MappingEntry, Memo, Node, Query, entry_of, same
-from potto.quick import quick, value
 
 Args = tuple[Hashable, ...]
 Asked = tuple[Callable[..., Any], Args]  # a query and what it is asked about
@@ -32,8 +33,7 @@ Sent = InputSent | AnswerSent | EntrySent
 MOST_BELOW = 5_000_000  # a limit on the walk down, beyond the size of any database
 
 
-@value
-class Parcel:
+class Parcel(Struct, frozen=True):
     """The answer with the number `root`, together with all values and nodes that were not sent before."""
 
     root: int
@@ -219,6 +219,3 @@ class Receiver:
         if known is None or known[0] != node.changed_at:
             known = self._digests[node] = (node.changed_at, digest(node.value))
         return known[1]
-
-
-quick(Parcel)

@@ -16,7 +16,8 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-from potto.quick import quick, value
+from msgspec import Struct
+
 from potto.syntax.tokens import FIRST_NAME, normalized
 
 _LINE = re.compile(r"\n(?:#.*\n)*\f*([^\s])")
@@ -37,8 +38,7 @@ MOST_IN_VAIN = 100  # searches for closing brackets that end at the same item, w
 PIECE = 2_000  # characters, beyond which the next piece begins as soon as it can
 
 
-@value
-class Chunk:
+class Chunk(Struct, frozen=True):
     """`text` from the offset `start` of the file, without the blank lines after it."""
 
     start: int
@@ -191,6 +191,3 @@ class _Lookahead:
                 break
         self.in_vain, self.seen = self.in_vain + 1, at
         return 0
-
-
-quick(Chunk)

@@ -7,26 +7,24 @@ from __future__ import annotations
 
 from typing import Literal
 
-from potto.quick import quick, value
+from msgspec import Struct
+
 from potto.source import Span
 from potto.syntax.type_nodes import Parameter
 
 
-@value
-class Number:
+class Number(Struct, frozen=True):
     span: Span
     text: str
     value: float
 
 
-@value
-class Name:
+class Name(Struct, frozen=True):
     span: Span
     id: str
 
 
-@value
-class Member:
+class Member(Struct, frozen=True):
     """`module.name`, written without blanks; `path` is the dotted module (`pkg.m`), `path_span` its place."""
 
     span: Span
@@ -36,15 +34,13 @@ class Member:
     name_span: Span
 
 
-@value
-class Unary:
+class Unary(Struct, frozen=True):
     span: Span
     op: Literal["-", "+", "not"]
     operand: Expr
 
 
-@value
-class Operand:
+class Operand(Struct, frozen=True):
     """One further operand of a chain, with the operator in front of it."""
 
     op: str
@@ -52,8 +48,7 @@ class Operand:
     value: Expr
 
 
-@value
-class Chain:
+class Chain(Struct, frozen=True):
     """`a + b - c` or `a * b / c`: left-associative operators of one precedence (`rest` is never empty)."""
 
     span: Span
@@ -61,15 +56,13 @@ class Chain:
     rest: tuple[Operand, ...]
 
 
-@value
-class Power:
+class Power(Struct, frozen=True):
     span: Span
     base: Expr
     exponent: Expr
 
 
-@value
-class Compare:
+class Compare(Struct, frozen=True):
     """`a <= x < b`: a chained comparison (`rest` is never empty; ops: < <= > >= == !=)."""
 
     span: Span
@@ -77,8 +70,7 @@ class Compare:
     rest: tuple[Operand, ...]
 
 
-@value
-class Logic:
+class Logic(Struct, frozen=True):
     """`p and q and r` or `p or q`, flat."""
 
     span: Span
@@ -86,38 +78,33 @@ class Logic:
     operands: tuple[Expr, ...]
 
 
-@value
-class Bracket:
+class Bracket(Struct, frozen=True):
     """The Iverson bracket `[p]`: 1 where p holds, else 0. p is a Compare, a Logic or a `not`."""
 
     span: Span
     condition: Expr
 
 
-@value
-class ListLiteral:
+class ListLiteral(Struct, frozen=True):
     span: Span
     items: tuple[Expr, ...]
 
 
-@value
-class Tuple:
+class Tuple(Struct, frozen=True):
     """`(a, b)`, two items or more."""
 
     span: Span
     items: tuple[Expr, ...]
 
 
-@value
-class Paren:
+class Paren(Struct, frozen=True):
     """`(e)`: kept so that the formatter prints what was written."""
 
     span: Span
     inner: Expr
 
 
-@value
-class If:
+class If(Struct, frozen=True):
     """`if p then a else b` or `p ? a : b`."""
 
     span: Span
@@ -127,8 +114,7 @@ class If:
     style: Literal["if", "?:"]
 
 
-@value
-class Lambda:
+class Lambda(Struct, frozen=True):
     """`\\(x, y) . \\c . e` is two Lambdas; `\\(x, y) . c . e` is one with two groups. Each group is one call."""
 
     span: Span
@@ -136,16 +122,14 @@ class Lambda:
     body: Expr
 
 
-@value
-class Argument:
+class Argument(Struct, frozen=True):
     span: Span
     name: str | None
     name_span: Span | None
     value: Expr
 
 
-@value
-class Apply:
+class Apply(Struct, frozen=True):
     """One group of arguments given to a function: `f(a, b)`, `f (a, b)`, `f x`. `f x y` is two Applys."""
 
     span: Span
@@ -154,8 +138,7 @@ class Apply:
     parenthesized: bool
 
 
-@value
-class Interval:
+class Interval(Struct, frozen=True):
     """`[lo, hi]` as the bounds of one variable of integration."""
 
     span: Span
@@ -163,8 +146,7 @@ class Interval:
     hi: Expr
 
 
-@value
-class MeasureBound:
+class MeasureBound(Struct, frozen=True):
     """`x ~ normal(m, s)` among the bounds of an integral.
 
     arguments: those of measures that a measure is made of among them, in the order of the text; `shape` says where they
@@ -181,16 +163,14 @@ class MeasureBound:
     inner: tuple[tuple[str, Span], ...]
 
 
-@value
-class Binder:
+class Binder(Struct, frozen=True):
     """A variable where it is bound, here after `d`."""
 
     span: Span
     name: str
 
 
-@value
-class Integral:
+class Integral(Struct, frozen=True):
     """`integral (bounds) body d(variables)`: the first variable is the outermost."""
 
     span: Span
@@ -199,8 +179,7 @@ class Integral:
     variables: tuple[Binder, ...]
 
 
-@value
-class Range:
+class Range(Struct, frozen=True):
     """`lo..hi`, both included: what an index goes through."""
 
     span: Span
@@ -208,8 +187,7 @@ class Range:
     hi: Expr
 
 
-@value
-class Clause:
+class Clause(Struct, frozen=True):
     """`i in lo..hi` or `p in points`: what a reduction, a comprehension or a fold goes through."""
 
     span: Span
@@ -217,8 +195,7 @@ class Clause:
     over: Range | Expr
 
 
-@value
-class Reduction:
+class Reduction(Struct, frozen=True):
     """`sum i in lo..hi (body)`, and `product`, `min`, `max`; of several clauses a later one may use those before."""
 
     span: Span
@@ -227,8 +204,7 @@ class Reduction:
     body: Expr
 
 
-@value
-class Fold:
+class Fold(Struct, frozen=True):
     """`fold s = start for i in lo..hi (body)`: the state after every step; `(a, b) = …` for a tuple's parts."""
 
     span: Span
@@ -238,8 +214,7 @@ class Fold:
     body: Expr
 
 
-@value
-class Comprehension:
+class Comprehension(Struct, frozen=True):
     """`[body for i in 0..n-1, j in 0..m-1]`: an array with a dimension for each clause."""
 
     span: Span
@@ -247,8 +222,7 @@ class Comprehension:
     clauses: tuple[Clause, ...]
 
 
-@value
-class Index:
+class Index(Struct, frozen=True):
     """`xs[i]`, `xs[i, j]`: the element at these places, counted from 0."""
 
     span: Span
@@ -256,8 +230,7 @@ class Index:
     indices: tuple[Expr, ...]
 
 
-@value
-class Field:
+class Field(Struct, frozen=True):
     """`c.focal` of a record, `u.x` or `u.1` of a tuple; written without a blank before the dot."""
 
     span: Span
@@ -266,8 +239,7 @@ class Field:
     name_span: Span
 
 
-@value
-class With:
+class With(Struct, frozen=True):
     """`c with focal = 2`, `c with (focal = 2, eye = e)`: the record with other values of some fields."""
 
     span: Span
@@ -275,16 +247,14 @@ class With:
     arguments: tuple[Argument, ...]
 
 
-@value
-class Text:
+class Text(Struct, frozen=True):
     """The name of a file between quotes, as `load` takes it."""
 
     span: Span
     text: str
 
 
-@value
-class Binding:
+class Binding(Struct, frozen=True):
     """`name = e` or `(a, b) = e`; in a definition's block or in a `let`."""
 
     span: Span
@@ -292,8 +262,7 @@ class Binding:
     value: Expr
 
 
-@value
-class Let:
+class Let(Struct, frozen=True):
     """`let a = e; (b, c) = f in body`."""
 
     span: Span
@@ -301,16 +270,14 @@ class Let:
     body: Expr
 
 
-@value
-class InlineDiffeo:
+class InlineDiffeo(Struct, frozen=True):
     """`diffeo(e, f)`: the condition holds where the first component is >= 0."""
 
     span: Span
     components: tuple[Expr, ...]
 
 
-@value
-class ErrorExpr:
+class ErrorExpr(Struct, frozen=True):
     """A place where the text could not be read as an expression. A diagnostic has said why."""
 
     span: Span
@@ -345,5 +312,3 @@ Expr = (
     | InlineDiffeo
     | ErrorExpr
 )
-
-quick(*(kind for kind in globals().values() if isinstance(kind, type) and kind.__module__ == __name__))

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from msgspec import Struct
+
 from potto.diagnostics import Diagnostic, Replacement, Suggestion
-from potto.quick import quick, value
 from potto.source import Span
 from potto.syntax import kinds
 from potto.syntax.tokens import Token
@@ -19,16 +20,14 @@ _OPERATORS = ("BINOP", "STAR", "SIGN")
 LONGEST = 200  # tokens that are looked at behind an `integral`
 
 
-@value
-class _Bound:
+class _Bound(Struct, frozen=True):
     """One variable of the head: its name (empty if it is not said) and its bound as it is written here."""
 
     variable: str
     written: str
 
 
-@value
-class _Head:
+class _Head(Struct, frozen=True):
     """The bounds that follow an `integral`, how many tokens they take, and whether they are written as here."""
 
     bounds: tuple[_Bound, ...]
@@ -207,6 +206,3 @@ def _commas(tokens: Sequence[Token]) -> int:
 
 def _text(text: str, tokens: Sequence[Token]) -> str:
     return text[tokens[0].start : tokens[-1].end]
-
-
-quick(_Bound, _Head)

@@ -10,8 +10,9 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, field
 
+from msgspec import Struct
+
 from potto.diagnostics import Diagnostic
-from potto.quick import quick, value
 from potto.source import Span
 from potto.syntax import kinds
 from potto.syntax.contextual import BEHIND, ENDS_OPERAND, MAY_BE_WORDS, SIMPLE_OPERATORS, contextual, uses_parameters
@@ -45,8 +46,7 @@ _FIELD = re.compile(rf"\.(?:{FIRST_NAME.pattern}|[0-9]+)")
 _ALSO = re.compile(rf"[ \t\n]*{FIRST_NAME.pattern}[ \t\n]+in\b")
 
 
-@value
-class Lexed:
+class Lexed(Struct, frozen=True):
     """What `lex` found: tokens (the last is `$END`), comments, diagnostics; which brackets are never closed."""
 
     tokens: list[Token]
@@ -393,6 +393,3 @@ def _read(text: str, diffeo: bool, alone: bool, unclosed: frozenset[int]) -> _Le
     lexer = _Lexer(text, diffeo, alone, nesting, nesting.tokens)
     lexer.run()
     return lexer
-
-
-quick(Lexed)

@@ -7,15 +7,15 @@ from __future__ import annotations
 
 import re
 
-from potto.quick import quick, value
+from msgspec import Struct
+
 from potto.source import Span
 from potto.syntax.tokens import normalized
 
 _ASKED = re.compile(r"^[ \t]*#>[ \t]?(?P<text>[^\n]*)$(?:\n[ \t]*#=[ \t]?(?P<expected>[^\n]*)$)?", re.MULTILINE)
 
 
-@value
-class Live:
+class Live(Struct, frozen=True):
     """One `#> e`: spans are absolute. `span` is from `#>` to its line's end; `text_span` is where e itself stands."""
 
     span: Span
@@ -42,6 +42,3 @@ def _trimmed(found: re.Match[str], group: str) -> tuple[str, Span]:
     text = found[group]
     start = found.start(group) + len(text) - len(text.lstrip())
     return text.strip(), Span(start, start + len(text.strip()))
-
-
-quick(Live)

@@ -6,7 +6,8 @@ a file; expressions are in `expr_nodes`, written types in `type_nodes`.
 
 from __future__ import annotations
 
-from potto.quick import quick, value
+from msgspec import Struct
+
 from potto.source import Span
 from potto.syntax.expr_nodes import Apply as Apply
 from potto.syntax.expr_nodes import Argument as Argument
@@ -56,8 +57,7 @@ from potto.syntax.type_nodes import TypeExpr as TypeExpr
 # Top-level items: one per chunk
 
 
-@value
-class ImportedName:
+class ImportedName(Struct, frozen=True):
     span: Span
     name: str
     name_span: Span
@@ -65,8 +65,7 @@ class ImportedName:
     alias_span: Span | None
 
 
-@value
-class FromImport:
+class FromImport(Struct, frozen=True):
     """`from pkg.m import a, b as c`."""
 
     span: Span
@@ -75,8 +74,7 @@ class FromImport:
     names: tuple[ImportedName, ...]
 
 
-@value
-class Import:
+class Import(Struct, frozen=True):
     """`import pkg.m` or `import pkg.m as k`."""
 
     span: Span
@@ -86,8 +84,7 @@ class Import:
     alias_span: Span | None
 
 
-@value
-class Definition:
+class Definition(Struct, frozen=True):
     """`def f(a, b)(c) body` (groups not empty) or `name = e` (groups empty).
 
     `bindings` are the lines before a def's last line; `result` is an annotation `-> T`.
@@ -103,8 +100,7 @@ class Definition:
     keyword: bool
 
 
-@value
-class RecordDefinition:
+class RecordDefinition(Struct, frozen=True):
     """`record Camera(eye: (Real, Real, Real), focal: Real)`: every field has a type."""
 
     span: Span
@@ -113,8 +109,7 @@ class RecordDefinition:
     fields: tuple[Parameter, ...]
 
 
-@value
-class DeclaredInverse:
+class DeclaredInverse(Struct, frozen=True):
     """`inverse (u, v) . (x, y)`: the author's inverse of a diffeomorphism."""
 
     span: Span
@@ -122,8 +117,7 @@ class DeclaredInverse:
     components: tuple[Expr, ...]
 
 
-@value
-class DiffeoDefinition:
+class DiffeoDefinition(Struct, frozen=True):
     """`diffeo name(x, y; c) = (u, v)` in a .po, or `name = \\(x, y) . \\c . (u, v)` in a .diffeo file.
 
     `variables` are the variables of integration, `groups` the further groups of parameters as they are called
@@ -143,14 +137,12 @@ class DiffeoDefinition:
     keyword: bool
 
 
-@value
-class Print:
+class Print(Struct, frozen=True):
     span: Span
     arguments: tuple[Expr, ...]
 
 
-@value
-class For:
+class For(Struct, frozen=True):
     """`for v in list: statements`."""
 
     span: Span
@@ -159,14 +151,12 @@ class For:
     body: tuple[Statement, ...]
 
 
-@value
-class ExpressionStatement:
+class ExpressionStatement(Struct, frozen=True):
     span: Span
     value: Expr
 
 
-@value
-class BrokenItem:
+class BrokenItem(Struct, frozen=True):
     """A chunk whose head could not be read. `name` is the best guess at what it was to define."""
 
     span: Span
@@ -200,5 +190,3 @@ Part = (
     | ImportedName
 )
 Node = Expr | TypeExpr | Item | Part
-
-quick(*(kind for kind in globals().values() if isinstance(kind, type) and kind.__module__ == __name__))

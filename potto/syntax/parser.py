@@ -10,8 +10,9 @@ import re
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from msgspec import Struct
+
 from potto.diagnostics import Diagnostic
-from potto.quick import quick, value
 from potto.source import Span
 from potto.syntax import kinds
 from potto.syntax.automaton import Automaton
@@ -36,8 +37,7 @@ LONG = 20_000
 """Tokens beyond which a chunk is not read again to find a better repair."""
 
 
-@value
-class ParsedChunk:
+class ParsedChunk(Struct, frozen=True):
     """The item of a chunk (None if it has only comments), with spans and diagnostics relative to the chunk."""
 
     item: Item | None
@@ -45,8 +45,7 @@ class ParsedChunk:
     comments: tuple[Comment, ...]
 
 
-@value
-class ParsedExpression:
+class ParsedExpression(Struct, frozen=True):
     """An expression by itself."""
 
     expr: Expr
@@ -291,6 +290,3 @@ def guess_name(text: str) -> str | None:
         return None
     name = found.group(1) or found.group(2)
     return name if name not in RESERVED else None
-
-
-quick(ParsedChunk, ParsedExpression)

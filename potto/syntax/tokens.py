@@ -8,7 +8,8 @@ from __future__ import annotations
 import re
 from typing import NamedTuple
 
-from potto.quick import quick, value
+from msgspec import Struct
+
 from potto.source import Span
 
 
@@ -25,8 +26,7 @@ class Token(NamedTuple):
         return Span(self.start, self.end)
 
 
-@value
-class Comment:
+class Comment(Struct, frozen=True):
     """A comment from its `#` to the end of its line; `own_line` when nothing else stands on the line."""
 
     span: Span
@@ -126,6 +126,3 @@ def normalized(text: str) -> str:
     if "\r" not in text:
         return text
     return text.replace("\r\n", " \n").replace("\r", "\n")
-
-
-quick(Comment)

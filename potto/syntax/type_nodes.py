@@ -4,19 +4,18 @@ from __future__ import annotations
 
 from typing import Literal
 
-from potto.quick import quick, value
+from msgspec import Struct
+
 from potto.source import Span
 
 
-@value
-class Parameter:
+class Parameter(Struct, frozen=True):
     span: Span
     name: str
     annotation: TypeExpr | None = None
 
 
-@value
-class RealType:
+class RealType(Struct, frozen=True):
     """`Real`, `Real*` (accepts what varies) or `Real[x, y]`, `Dist[x]`."""
 
     span: Span
@@ -25,14 +24,12 @@ class RealType:
     variables: tuple[str, ...]
 
 
-@value
-class TupleType:
+class TupleType(Struct, frozen=True):
     span: Span
     items: tuple[TypeExpr, ...]
 
 
-@value
-class Size:
+class Size(Struct, frozen=True):
     """How many elements: a number (`name` None), a name, a name and a number (`n - 1`), `_` for any, "" not written."""
 
     span: Span
@@ -40,8 +37,7 @@ class Size:
     offset: int
 
 
-@value
-class ArrayType:
+class ArrayType(Struct, frozen=True):
     """`[3] Real`, `[n, m] Real`; `[T]`, with no size written, is of any."""
 
     span: Span
@@ -49,16 +45,14 @@ class ArrayType:
     item: TypeExpr
 
 
-@value
-class NamedType:
+class NamedType(Struct, frozen=True):
     """A record by its name, or by that of its module and its own (`scene.Camera`)."""
 
     span: Span
     name: str
 
 
-@value
-class FunctionType:
+class FunctionType(Struct, frozen=True):
     """`(A, name: B) -> C`; parameters in one group."""
 
     span: Span
@@ -66,8 +60,7 @@ class FunctionType:
     result: TypeExpr
 
 
-@value
-class DiffeoType:
+class DiffeoType(Struct, frozen=True):
     """`Diffeo[2]`."""
 
     span: Span
@@ -75,6 +68,3 @@ class DiffeoType:
 
 
 TypeExpr = RealType | TupleType | ArrayType | NamedType | FunctionType | DiffeoType
-
-
-quick(Parameter, RealType, TupleType, Size, ArrayType, NamedType, FunctionType, DiffeoType)

@@ -7,11 +7,14 @@ are walked again until they stand still (they only grow, and there are finitely 
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Iterable, Mapping, Set
+
+from msgspec import Struct
+from msgspec.structs import replace
 
 from potto.diagnostics import Diagnostic, Related
 from potto.modules.lookup import DefinitionTarget
-from potto.quick import quick, replace, value
 from potto.source import Span
 from potto.syntax import nodes
 from potto.types import (  # noqa: F401  (imported for their rules)
@@ -48,8 +51,7 @@ MAX_ROUNDS = 20
 Written = nodes.Definition | nodes.DiffeoDefinition
 
 
-@value
-class Typed:
+class Typed(Struct, frozen=True):
     """A name where it is bound or used inside a definition, with its type there."""
 
     span: Span
@@ -57,8 +59,7 @@ class Typed:
     type: Type
 
 
-@value
-class DefinitionAnalysis:
+class DefinitionAnalysis(Struct, frozen=True):
     """What is known about one definition. Its parts are read through queries, which stand still when they do."""
 
     interface: Interface
@@ -103,7 +104,7 @@ def analyse(
         walk, value = walked[target]
         typed = found[target] = _conclude(target, item, inferences[target], walk, value, skeletons[target], details)
         if target in broken:
-            found[target] = replace(typed, interface=replace(typed.interface, broken=True), diagnostics=())
+            found[target] = replace(typed, interface=dataclasses.replace(typed.interface, broken=True), diagnostics=())
         elif target in unended:
             found[target] = replace(typed, diagnostics=_sorted((*typed.diagnostics, *unended[target])))
     return found
@@ -268,6 +269,3 @@ def local_type(type: Type, value: Value | None) -> Type:
     if isinstance(value, AbstractFunction):
         return Decorating(value).type(close_type(type), value)
     return close_type(type)
-
-
-quick(Typed, DefinitionAnalysis)

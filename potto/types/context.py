@@ -11,9 +11,10 @@ import sys
 from collections.abc import Callable
 from typing import Any, Literal, NamedTuple, TypeVar
 
+from msgspec import Struct
+
 from potto.diagnostics import Diagnostic
 from potto.modules.lookup import DefinitionTarget
-from potto.quick import quick, value
 from potto.source import Span
 from potto.syntax import nodes
 from potto.types.mismatches import mismatch, misused_derivative, not_a_number, shadowing
@@ -65,8 +66,7 @@ def ensure_stack() -> None:
         sys.setrecursionlimit(STACK)
 
 
-@value
-class ArgumentPlan:
+class ArgumentPlan(Struct, frozen=True):
     """Which arguments fill which parameters: per group its slots, or None if it stays open. A slot lists the arguments
     that fill the parameter (several make up its tuple). `spread`: the only argument is a tuple for the whole group."""
 
@@ -74,8 +74,7 @@ class ArgumentPlan:
     spread: bool = False
 
 
-@value
-class NamedPart:
+class NamedPart(Struct, frozen=True):
     """The name of a part where it is written (`u.x`, `c with x = 1`): what it is of, and its type."""
 
     span: Span
@@ -91,8 +90,7 @@ class End(NamedTuple):
     offset: int
 
 
-@value
-class IndexReach:
+class IndexReach(Struct, frozen=True):
     """The least and the greatest that the index `name` of a range is."""
 
     name: str
@@ -101,8 +99,7 @@ class IndexReach:
     high: End
 
 
-@value
-class _Pending:
+class _Pending(Struct, frozen=True):
     """A type that is not known yet, and what is to be its dual; `node` is what is derived.
 
     `generation`: how many duals led here, each through what was not known of the one before.
@@ -341,6 +338,3 @@ class Reaching:
 
     def __exit__(self, *raised: object) -> None:
         self._inference.reaches = self._around
-
-
-quick(ArgumentPlan, NamedPart, IndexReach, _Pending)

@@ -12,9 +12,10 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
+from msgspec import Struct
+
 from potto.diagnostics import Diagnostic
 from potto.modules.lookup import DefinitionTarget
-from potto.quick import quick, value
 from potto.source import Span
 from potto.syntax import nodes
 from potto.types.algebra import (
@@ -67,8 +68,7 @@ class Frame:
     noted: set[tuple[object, Source]] = field(default_factory=set)
 
 
-@value
-class Surfaces:
+class Surfaces(Struct, frozen=True):
     """A diffeomorphic condition that was met: for the lints on what moves it."""
 
     span: Span
@@ -208,6 +208,3 @@ def _split(effect: Effect, frame: Frame) -> tuple[Effect | None, Effect | None]:
     outer = {source: trail for source, trail in sources.items() if source not in frame.inputs}
     mine = AbstractScalar(own, effect.value.jumps, effect.value.spikes, effect.value.carriers & frame.inputs)
     return Effect(effect.to, mine), Effect(effect.to, AbstractScalar(outer)) if outer else None
-
-
-quick(Surfaces)

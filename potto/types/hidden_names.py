@@ -10,11 +10,10 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 
-from msgspec.structs import replace as changed
+from msgspec.structs import replace
 
 from potto.diagnostics import Diagnostic, Replacement
 from potto.modules.lookup import DefinitionTarget
-from potto.quick import replace
 from potto.types.interfaces import Interface
 from potto.types.types import REAL, Function, Parameter, TupleOf, resolve
 from potto.types.unify import NUMBERS, rebuild
@@ -40,7 +39,7 @@ def without_names(found: Interface, target: DefinitionTarget) -> Interface:
         return found
     signs = (f"\ue000{place}\ue001{target.file}\ue001{target.name}\ue002" for place in range(len(type.parameters)))
     parameters = tuple([Parameter(sign, p.type) for sign, p in zip(signs, type.parameters)])
-    return replace(found, type=Function(parameters, type.result), plain=(), varies=())
+    return Interface(found.name, Function(parameters, type.result), found.flow)
 
 
 def with_names(
@@ -69,14 +68,14 @@ def _named(said: Diagnostic, names: Callable[[DefinitionTarget], tuple[str | Non
     def written(text: str) -> str:
         return _SIGN.sub(name, text)
 
-    related = tuple([changed(near, message=written(near.message)) for near in said.related])
+    related = tuple([replace(near, message=written(near.message)) for near in said.related])
     suggestions = tuple(
         [
-            changed(each, title=written(each.title), edits=tuple([_edit(edit, written) for edit in each.edits]))
+            replace(each, title=written(each.title), edits=tuple([_edit(edit, written) for edit in each.edits]))
             for each in said.suggestions
         ]
     )
-    return changed(
+    return replace(
         said, message=written(said.message), label=written(said.label), help=written(said.help), related=related,
         notes=tuple(map(written, said.notes)), suggestions=suggestions,
     )  # fmt: skip

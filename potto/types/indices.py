@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import math
 
+from msgspec import Struct
+
 from potto.diagnostics import Related, Suggestion, shortened, suggest
-from potto.quick import quick, value
 from potto.source import Span
 from potto.syntax import nodes
 from potto.syntax.printer import print_expression
@@ -35,8 +36,7 @@ from potto.types.types import (
 from potto.types.vectors import expect_array
 
 
-@value
-class _Reached:
+class _Reached(Struct, frozen=True):
     """Between what an index lies. `reach`: the range that it follows, if it does, and `down` whether against it."""
 
     low: End
@@ -309,6 +309,3 @@ def _sum(a: End, b: End, down: bool) -> End | None:
     if down:
         return End(None, a.offset - b.offset) if a.base is b.base else None
     return End(b.base, a.offset + b.offset) if a.base is None else None
-
-
-quick(_Reached)

@@ -14,9 +14,10 @@ from functools import cache, lru_cache
 from operator import attrgetter
 from typing import Any, Literal
 
+from msgspec.structs import replace
+
 from potto.core.packing import found_by
 from potto.modules.lookup import DefinitionTarget
-from potto.quick import quick, replace
 from potto.types.algebra import flat, inputs_of, inputs_of_ports, join, ports_in
 from potto.types.types import (
     REAL,
@@ -388,6 +389,3 @@ class Decorating:
 
     def _varies(self, source: Source) -> bool:
         return source.kind == "variable" or (source in self.inputs and source not in self.settled)
-
-
-quick(Interface)

@@ -9,8 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from msgspec.structs import replace
+
 from potto.diagnostics import Diagnostic, Suggestion, shortened
-from potto.quick import replace
 from potto.source import NOWHERE
 from potto.syntax import nodes
 from potto.syntax.printer import print_expression

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from msgspec.structs import replace
+
 from potto.diagnostics import Diagnostic, Related
 from potto.modules.texts import definition
-from potto.quick import replace
 from potto.syntax import nodes
 from potto.syntax.written import without_parentheses
 from potto.types.context import Inference

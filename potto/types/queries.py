@@ -10,13 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Container, Sequence
 
+from msgspec import Struct
+
 from potto.diagnostics import Diagnostic
 from potto.modules.free import Reference, references_in
 from potto.modules.graph import refer, references, strongly_connected
 from potto.modules.lookup import DefinitionTarget, ModuleTarget, resolve_member
 from potto.modules.texts import chunk_references, chunk_text, definition, is_diffeo, parsed
 from potto.query import Database, query
-from potto.quick import quick, value
 from potto.syntax import nodes
 from potto.types import motionless
 from potto.types.algebra import symbolic
@@ -35,8 +36,7 @@ from potto.types.unify import bare, open_type
 from potto.types.values import Port, Source, Value
 
 
-@value
-class Inferred:
+class Inferred(Struct, frozen=True):
     """The type of an expression (or of none), and what is wrong with it. Spans are the expression's."""
 
     type: Type
@@ -237,6 +237,3 @@ def _inferred(
     found = (*inference.diagnostics, *walk.diagnostics)
     answer = Inferred(local_type(type, value), tuple(sorted(found, key=lambda d: (d.span, d.code))))
     return answer, typed(inference, walk)
-
-
-quick(Inferred)

@@ -5,14 +5,14 @@ Not part of the interface, because edits move it.
 
 from __future__ import annotations
 
+from msgspec import Struct
+
 from potto.modules.lookup import DefinitionTarget
-from potto.quick import quick, value
 from potto.source import Span
 from potto.types.values import SinkKind, Step
 
 
-@value
-class Reason:
+class Reason(Struct, frozen=True):
     """Why an input must not vary: what it is ("its parameter `y`"), the place in the definition, and the way there.
 
     `further`: it is passed on to another definition's input, which must not vary.
@@ -27,8 +27,7 @@ class Reason:
     further: tuple[DefinitionTarget, int] | None
 
 
-@value
-class GivenVariable:
+class GivenVariable(Struct, frozen=True):
     """Which variable of integration a definition gives to a function that is its parameter."""
 
     number: int
@@ -37,8 +36,7 @@ class GivenVariable:
     further: tuple[DefinitionTarget, int] | None
 
 
-@value
-class Reasons:
+class Reasons(Struct, frozen=True):
     """What a definition demands and why, with places. Not part of the interface: edits move it."""
 
     plain: tuple[Reason, ...] = ()
@@ -52,6 +50,3 @@ class Reasons:
 
 
 NO_REASONS = Reasons()
-
-
-quick(Reason, GivenVariable, Reasons)

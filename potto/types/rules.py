@@ -9,10 +9,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from msgspec import Struct
+
 from potto.diagnostics import Diagnostic, Kind, Related
 from potto.modules.lookup import DefinitionTarget
 from potto.primitives import PRIMITIVES
-from potto.quick import quick, value
 from potto.source import Span
 from potto.syntax import nodes
 from potto.syntax.printer import print_expression
@@ -36,8 +37,7 @@ KINDS: dict[SinkKind, Kind] = {
 }
 
 
-@value
-class Violation:
+class Violation(Struct, frozen=True):
     """A sink reached by variables of integration, the ways there, and where to show it for want of a better place."""
 
     sink: Sink
@@ -252,6 +252,3 @@ def shown_delta(expr: nodes.Expr) -> Diagnostic:
         label="outside of an integral",
         help="integrate it over the variables of its deltas",
     )
-
-
-quick(Violation)

@@ -12,6 +12,8 @@ from dataclasses import dataclass, field
 from functools import cache
 from typing import Literal
 
+from msgspec import Struct
+
 from potto.diagnostics import Diagnostic, Related, Replacement, Suggestion
 from potto.measures import MEASURES
 from potto.modules.builtins import CONSTANTS, PROJECTIONS, SPECIALS, VECTORS, is_builtin
@@ -20,7 +22,6 @@ from potto.modules.lookup import DefinitionBinding, DefinitionTarget, find_modul
 from potto.modules.texts import definition, imports, names
 from potto.primitives import PRIMITIVES
 from potto.query import Database, query
-from potto.quick import quick, value
 from potto.reports.near import did_you_mean, instead, near_names
 from potto.source import Span
 from potto.syntax import nodes
@@ -51,30 +52,26 @@ class Local:
     of_lambda: bool = False
 
 
-@value
-class InterfaceName:
+class InterfaceName(Struct, frozen=True):
     """Another definition, through its interface."""
 
     target: DefinitionTarget
     interface: Interface
 
 
-@value
-class RecursiveName:
+class RecursiveName(Struct, frozen=True):
     """A definition of the group that is inferred right now: recursion."""
 
     target: DefinitionTarget
 
 
-@value
-class BuiltinName:
+class BuiltinName(Struct, frozen=True):
     """A builtin, a constant or one of the special forms."""
 
     name: str
 
 
-@value
-class ModuleName:
+class ModuleName(Struct, frozen=True):
     """A module's name, which is not a value."""
 
     name: str
@@ -279,6 +276,3 @@ def names_at_top(db: Database, top: str) -> tuple[str, ...]:
             else:
                 found.extend(imported.alias or imported.name for imported in item.names)
     return tuple(found)
-
-
-quick(InterfaceName, RecursiveName, BuiltinName, ModuleName)

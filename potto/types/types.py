@@ -11,11 +11,10 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TypeGuard, assert_never
 
-from potto.quick import quick, value
+from msgspec import Struct
 
 
-@value
-class Real:
+class Real(Struct, frozen=True):
     """A number. `star`: a parameter that accepts what varies. `variables`: the variables of integration it varies with.
 
     `jumps` are the variables and parameters across whose surfaces it jumps: its derivative is a `Dist` over them.
@@ -27,15 +26,13 @@ class Real:
     jumps: tuple[str, ...] = ()
 
 
-@value
-class Dist:
+class Dist(Struct, frozen=True):
     """A distribution over variables (or parameters): only an integral over them makes a number of it."""
 
     variables: tuple[str, ...] = ()
 
 
-@value
-class RecordName:
+class RecordName(Struct, frozen=True):
     """Which record a tuple is: its definition, and the names of the fields. texts: the columns of a file of data that
     are not among them, as they hold no numbers; gaps: those that are not, as they lack values, with the first line
     without one. dual: it is the dual of one that holds functions, whose fields are the
@@ -54,8 +51,7 @@ class RecordName:
         return f"D {self.name}" if self.dual else self.name
 
 
-@value
-class TupleOf:
+class TupleOf(Struct, frozen=True):
     """A tuple. `dual`: a value and its tangent, for which a plain number may be given. `record`: its fields have names,
     and it is told from other tuples by its own."""
 
@@ -64,78 +60,67 @@ class TupleOf:
     record: RecordName | None = None
 
 
-@value
-class ArrayOf:
+class ArrayOf(Struct, frozen=True):
     """An array of items of one type. `size` is a Count, a SizeVar, Shifted, AnySize or a Meta."""
 
     size: Type
     item: Type
 
 
-@value
-class Count:
+class Count(Struct, frozen=True):
     """A size that is known."""
 
     number: int
 
 
-@value
-class SizeVar:
+class SizeVar(Struct, frozen=True):
     """A size of a finished type: any number, the same wherever the name stands."""
 
     name: str
 
 
-@value
-class Shifted:
+class Shifted(Struct, frozen=True):
     """A size that differs from another one, which is not known, by a number."""
 
     base: Type
     offset: int
 
 
-@value
-class AnySize:
+class AnySize(Struct, frozen=True):
     """A size that is known at run time only. It fits every other."""
 
 
-@value
-class Parameter:
+class Parameter(Struct, frozen=True):
     """A parameter of a function type; the name is None where it is not known (a function that is a parameter)."""
 
     name: str | None
     type: Type
 
 
-@value
-class Function:
+class Function(Struct, frozen=True):
     """A function of one group of parameters. A group of n also accepts one tuple of n, and back."""
 
     parameters: tuple[Parameter, ...]
     result: Type
 
 
-@value
-class Diffeo:
+class Diffeo(Struct, frozen=True):
     """What a diffeomorphism gives: a tuple of `dims` numbers that may stand as a condition. None: any number."""
 
     dims: int | None
 
 
-@value
-class Truth:
+class Truth(Struct, frozen=True):
     """What a comparison gives. Local names may hold one; parameters and results may not."""
 
 
-@value
-class TypeVariable:
+class TypeVariable(Struct, frozen=True):
     """A type variable of a finished type: any type, the same wherever the name stands."""
 
     name: str
 
 
-@value
-class Unknown:
+class Unknown(Struct, frozen=True):
     """The type of what is wrong. It fits everything, so that one mistake gives one message."""
 
 
@@ -168,9 +153,7 @@ def resolve(type: Type) -> Type:
     while isinstance(root, Meta) and root.found is not None:
         root = root.found
     while isinstance(type, Meta) and type.found is not None:
-        after = type.found  # held while nothing else may: the compiler of the front end would only borrow it
-        type.found = root
-        type = after
+        type.found, type = root, type.found
     return root
 
 
@@ -326,22 +309,3 @@ def _derivative(type: Type, parameters: frozenset[str]) -> Type:
             return UNKNOWN
         case _:
             assert_never(type)
-
-
-quick(
-    Real,
-    Dist,
-    RecordName,
-    TupleOf,
-    ArrayOf,
-    Count,
-    SizeVar,
-    Shifted,
-    AnySize,
-    Parameter,
-    Function,
-    Diffeo,
-    Truth,
-    TypeVariable,
-    Unknown,
-)

@@ -15,7 +15,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from potto.quick import quick, value
+from msgspec import Struct
+
 from potto.source import NOWHERE, Span
 
 SourceKind = Literal["variable", "input", "other"]  # other: the index of a sum, or what is wrong
@@ -36,8 +37,7 @@ class Source:
         return f"<{self.kind} {self.name}>"
 
 
-@value
-class Step:
+class Step(Struct, frozen=True):
     """One step on the way of a dependence: a place and what happens there."""
 
     span: Span
@@ -45,8 +45,7 @@ class Step:
     argument: bool = False
 
 
-@value
-class Joined:
+class Joined(Struct, frozen=True):
     """A way made of two ways."""
 
     first: Trail
@@ -58,16 +57,14 @@ Sources = Mapping[Source, Trail]
 Surface = frozenset[Source]
 
 
-@value
-class Spike:
+class Spike(Struct, frozen=True):
     """A delta: what its surface varies with, and a key that is the same for the same surface."""
 
     over: Surface
     key: str
 
 
-@value
-class AbstractScalar:
+class AbstractScalar(Struct, frozen=True):
     """A number, a truth value or anything whose inside is not known.
 
     `carriers`: sources of unknown type that it may be itself (the rest only decides which). `jumps`: the surfaces
@@ -81,13 +78,11 @@ class AbstractScalar:
     carriers: frozenset[Source] = frozenset()
 
 
-@value
-class TupleValue:
+class TupleValue(Struct, frozen=True):
     items: tuple[Value, ...]
 
 
-@value
-class ListValue:
+class ListValue(Struct, frozen=True):
     item: Value
 
 
@@ -100,21 +95,18 @@ class Port:
     origin: Any = None
 
 
-@value
-class PortTuple:
+class PortTuple(Struct, frozen=True):
     items: tuple[PortTree, ...]
 
 
-@value
-class PortFunction:
+class PortFunction(Struct, frozen=True):
     """A function is given: `inputs` is what it will be called with, `result` gets what it gives."""
 
     inputs: tuple[Value, ...]
     result: PortTree
 
 
-@value
-class NoPort:
+class NoPort(Struct, frozen=True):
     """What is given here is not looked at (a tangent)."""
 
 
@@ -132,16 +124,14 @@ class Sink:
     node: Any = None
 
 
-@value
-class Effect:
+class Effect(Struct, frozen=True):
     """`value` goes to `to` when the function is called."""
 
     to: Sink | Port
     value: Value
 
 
-@value
-class AbstractFunction:
+class AbstractFunction(Struct, frozen=True):
     inputs: tuple[Value, ...]
     result: Value
     effects: tuple[Effect, ...] = ()
@@ -156,8 +146,7 @@ class Abstract:
     taint: Sources = field(default_factory=dict)
 
 
-@value
-class Choice:
+class Choice(Struct, frozen=True):
     """One of several functions (the items of a list)."""
 
     options: tuple[Value, ...]
@@ -169,20 +158,3 @@ NONE: Sources = {}
 STILL = AbstractScalar(NONE)
 HAZE = Source("other", "?")
 HAZY = AbstractScalar({HAZE: None})  # what is wrong: varies with it knows what, and breaks no rule
-
-
-quick(
-    Step,
-    Joined,
-    Spike,
-    AbstractScalar,
-    TupleValue,
-    ListValue,
-    PortTuple,
-    PortFunction,
-    Effect,
-    AbstractFunction,
-    Choice,
-    NoPort,
-    Abstract,
-)

@@ -11,7 +11,6 @@ import pytest
 from potto.query import Cancelled, Database, query
 from potto.query.nodes import Memo
 from potto.query.travel import Receiver, Sender
-from potto.quick import is_compiled
 
 NAMES = "abcdefgh"
 
@@ -154,7 +153,6 @@ def test_an_input_that_is_not_there_must_not_be_there_here_either() -> None:
     assert not sent(Sender(there), Receiver(here), "a", "b")
 
 
-@pytest.mark.skipif(is_compiled(Database), reason="a method of machine code cannot be replaced")
 def test_taking_over_can_be_cancelled_and_goes_on() -> None:
     texts = {name: f"our {name}" for name in NAMES}
     there, here = database(**texts), database(**texts)

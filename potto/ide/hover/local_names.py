@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
+from msgspec.structs import replace
+
 from potto.ide.hover.derivatives import code, condition_infos, fence
 from potto.ide.names.places import ChunkAt, owner
 from potto.ide.names.symbols import LocalSymbol, parameters
 from potto.query import Database
-from potto.quick import replace
 from potto.source import Span
 from potto.syntax import live_expressions, nodes, parse_expression, walk
 from potto.syntax.live import Live

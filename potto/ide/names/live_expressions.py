@@ -7,12 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from msgspec.structs import replace
+
 from potto.diagnostics import Diagnostic
 from potto.ide.names.places import pieces_of
 from potto.modules.misread import moved
 from potto.modules.texts import groups_of_pieces
 from potto.query import Database, query
-from potto.quick import replace
 from potto.syntax import live_expressions, parse_expression, split
 from potto.syntax.live import Live
 from potto.types import infer_expression
