@@ -24,7 +24,7 @@ from potto_lsp.text import DocumentText, Encoding
 from potto_lsp.uris import to_key, to_uri
 
 if TYPE_CHECKING:
-    from potto.checking.kept import Kept
+    from potto.checking.kept import KeptWorkspace
     from potto.crew import Crew
 
 logger = logging.getLogger(__name__)
@@ -55,7 +55,7 @@ class Analysis:
         self._ripe: set[str] = set()  # files checked since trees were last forgotten
         self.settled = False  # whether all files have been checked
         self._crew: Crew | None = None
-        self._kept: Kept | None = None  # what an earlier session has found out, until it is taken over
+        self._kept: KeptWorkspace | None = None  # what an earlier session has found out, until it is taken over
         self._looked = False  # whether that was looked for
         self.taken: set[str] = set()  # files that helpers or an earlier session have checked
         self.known_before: set[str] = set()  # those of an earlier session
@@ -270,10 +270,10 @@ class Analysis:
 
     def look_for_kept(self) -> None:
         """Look for what an earlier session has found out about the workspace."""
-        from potto.checking.kept import Kept
+        from potto.checking.kept import KeptWorkspace
 
         if not self._looked:
-            self._kept, self._looked = Kept(self.db, self.files.roots), True
+            self._kept, self._looked = KeptWorkspace(self.db, self.files.roots), True
 
     @property
     def has_kept(self) -> bool:

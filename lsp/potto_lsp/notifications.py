@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 PATTERNS = ("**/*.{po,diffeo}", "**/potto.toml", "**/*.{csv,tsv,npy,npz,json,png,jpg,jpeg}")
 
 
-class Server(Protocol):
+class NotifiedServer(Protocol):
     """What notifications need of a server. `edit` changes what the analysis sees, on its thread."""
 
     documents: Documents
@@ -32,15 +32,15 @@ class Server(Protocol):
     def request(self, method: str, params: Any, reply: Reply | None = None) -> None: ...
 
 
-Handler = Callable[[Server, Any], None]
+Handler = Callable[[NotifiedServer, Any], None]
 
 
-def _session(server: Server) -> ClientSession:
+def _session(server: NotifiedServer) -> ClientSession:
     assert server.session is not None
     return server.session
 
 
-def initialized(server: Server, params: Any) -> None:
+def initialized(server: NotifiedServer, params: Any) -> None:
     """The client can now be asked."""
     session = _session(server)
     if session.watched:
@@ -64,7 +64,7 @@ def initialized(server: Server, params: Any) -> None:
     server.worker.check_again()
 
 
-def _ask_settings(server: Server) -> None:
+def _ask_settings(server: NotifiedServer) -> None:
     def reply(result: Any, error: Any) -> None:
         if isinstance(result, list) and result and isinstance(result[0], Mapping):
             settings = result[0]
@@ -73,13 +73,13 @@ def _ask_settings(server: Server) -> None:
     server.request("workspace/configuration", {"items": [{"section": "potto"}]}, reply)
 
 
-def _configure(server: Server, settings: Any) -> None:
+def _configure(server: NotifiedServer, settings: Any) -> None:
     session = _session(server)
     session.configure(settings)
     session.diagnostics_changed()
 
 
-def did_change_configuration(server: Server, params: Any) -> None:
+def did_change_configuration(server: NotifiedServer, params: Any) -> None:
     """Settings have changed. If the client can be asked for them, it is."""
     if _session(server).client.can("workspace.configuration"):
         _ask_settings(server)
@@ -87,7 +87,7 @@ def did_change_configuration(server: Server, params: Any) -> None:
         server.edit(lambda: _configure(server, params.get("settings")))
 
 
-def did_open(server: Server, params: Any) -> None:
+def did_open(server: NotifiedServer, params: Any) -> None:
     document = server.documents.open(params)
 
     def opened() -> None:
@@ -100,13 +100,13 @@ def did_open(server: Server, params: Any) -> None:
     server.edit(opened)
 
 
-def did_change(server: Server, params: Any) -> None:
+def did_change(server: NotifiedServer, params: Any) -> None:
     document = server.documents.change(params)
     if document is not None:
         server.edit(lambda: _session(server).analysis.put(document))
 
 
-def did_close(server: Server, params: Any) -> None:
+def did_close(server: NotifiedServer, params: Any) -> None:
     document = server.documents.close(params)
     if document is None:
         return
@@ -118,7 +118,7 @@ def did_close(server: Server, params: Any) -> None:
     server.edit(close)
 
 
-def did_save(server: Server, params: Any) -> None:
+def did_save(server: NotifiedServer, params: Any) -> None:
     """Look at the disk again, for clients that don't watch files."""
     key = to_key(params["textDocument"]["uri"])
 
@@ -131,7 +131,7 @@ def did_save(server: Server, params: Any) -> None:
     server.edit(saved)
 
 
-def did_change_watched_files(server: Server, params: Any) -> None:
+def did_change_watched_files(server: NotifiedServer, params: Any) -> None:
     """Files have changed on disk, appeared or gone."""
     changes = params["changes"]
     keys = [to_key(change["uri"]) for change in changes]
@@ -148,12 +148,12 @@ def did_change_watched_files(server: Server, params: Any) -> None:
     server.edit(refresh)
 
 
-def files_moved(server: Server, params: Any) -> None:
+def files_moved(server: NotifiedServer, params: Any) -> None:
     """The client has created, renamed or deleted files."""
     server.edit(lambda: _session(server).analysis.files.refresh())
 
 
-def did_change_workspace_folders(server: Server, params: Any) -> None:
+def did_change_workspace_folders(server: NotifiedServer, params: Any) -> None:
     event = params["event"]
     added = [folder["uri"] for folder in event.get("added", [])]
     removed = {to_key(folder["uri"]) for folder in event.get("removed", [])}
@@ -169,14 +169,14 @@ def did_change_workspace_folders(server: Server, params: Any) -> None:
     server.edit(change)
 
 
-def cancel_progress(server: Server, params: Any) -> None:
+def cancel_progress(server: NotifiedServer, params: Any) -> None:
     """The user has cancelled something."""
     stop = _session(server).cancels.get(params["token"])
     if stop is not None:
         stop()
 
 
-def ignore(server: Server, params: Any) -> None:
+def ignore(server: NotifiedServer, params: Any) -> None:
     """Nothing to be done."""
 
 

@@ -1,7 +1,7 @@
 """Measuring: each method up its ladder on each problem, until a rung takes too long.
 
-Owns `Run`, `measure` and `slope`. Times are warm: everything is made ready and run once before the clock counts. What a
-method says of its error is kept beside the true error.
+Owns `BenchRun`, `measure` and `slope`. Times are warm: everything is made ready and run once before the clock counts.
+What a method says of its error is kept beside the true error.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ SPARE = 0.02  # seconds that repeats may take in all
 FLOOR, CEILING = 1e-13, 0.5  # errors below are rounding, above no answers: they say nothing about convergence
 
 
-class Run(Struct, frozen=True):
+class BenchRun(Struct, frozen=True):
     """One method at one setting on one problem.
 
     seconds: the least time of an answer. error: relative; of a random method the root mean square over seeds.
@@ -47,7 +47,7 @@ class Run(Struct, frozen=True):
 def measure(
     problems: Iterable[BenchProblem], adapters: Sequence[Adapter], quantities: Sequence[Quantity], seconds: float,
     rungs: int | None = None,
-) -> Iterator[Run]:  # fmt: skip
+) -> Iterator[BenchRun]:  # fmt: skip
     """Runs as they are done. A ladder ends after `rungs`, or at the first answer that takes longer than `seconds`."""
     for problem, quantity, adapter in itertools.product(problems, quantities, adapters):
         ladder = adapter.ladder(problem)[:rungs]
@@ -57,7 +57,7 @@ def measure(
 
 def climb(
     problem: BenchProblem, quantity: Quantity, adapter: Adapter, ladder: Sequence[float], seconds: float
-) -> Iterator[Run]:
+) -> Iterator[BenchRun]:
     """One method on one problem, rung by rung."""
     solve = adapter.prepare(problem, quantity)
     for number, rung in enumerate(ladder):
@@ -67,14 +67,14 @@ def climb(
             run = timed(problem, quantity, adapter, solve, rung)
         except Exception as error:  # a peer may raise what it likes; the report says so
             said, nan = f"{type(error).__name__}: {error}".partition("\n")[0], math.nan
-            yield Run(problem.id, quantity, adapter.name, adapter.dial, rung, nan, 0, nan, nan, None, said)
+            yield BenchRun(problem.id, quantity, adapter.name, adapter.dial, rung, nan, 0, nan, nan, None, said)
             return
         yield run
         if run.seconds > seconds:
             return
 
 
-def timed(problem: BenchProblem, quantity: Quantity, adapter: Adapter, solve: Solve, rung: float) -> Run:
+def timed(problem: BenchProblem, quantity: Quantity, adapter: Adapter, solve: Solve, rung: float) -> BenchRun:
     """One rung: a few repeats, or a few seeds."""
     answers: list[MethodAnswer] = []
     times: list[float] = []
@@ -87,7 +87,7 @@ def timed(problem: BenchProblem, quantity: Quantity, adapter: Adapter, solve: So
     errors = [problem.error(quantity, answer.value) for answer in answers]
     exact = abs(problem.exact[quantity])
     reports = [answer.reported / exact for answer in answers if answer.reported is not None]
-    return Run(
+    return BenchRun(
         problem.id, quantity, adapter.name, adapter.dial, rung, min(times),
         round(statistics.fmean(answer.evaluations for answer in answers)), answers[0].value, rms(errors),
         rms(reports) if reports else None,
@@ -99,7 +99,7 @@ def rms(numbers: Sequence[float]) -> float:
     return math.sqrt(statistics.fmean(x * x for x in numbers))
 
 
-def slope(runs: Iterable[Run]) -> float | None:
+def slope(runs: Iterable[BenchRun]) -> float | None:
     """The slope of log(error) over log(evaluations) through runs, by least squares; None for fewer than four points."""
     points = [(math.log(r.evaluations), math.log(r.error)) for r in runs
               if r.evaluations > 0 and FLOOR < r.error < CEILING]  # fmt: skip

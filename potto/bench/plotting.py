@@ -9,7 +9,7 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from potto.bench.measure import Run
+from potto.bench.measure import BenchRun
 from potto.bench.problems import BenchProblem, Quantity
 
 LEAST = 1e-17  # where an error of zero is drawn
@@ -26,7 +26,7 @@ def has_matplotlib() -> bool:
     return find_spec("matplotlib") is not None
 
 
-def save(problems: Sequence[BenchProblem], quantity: Quantity, runs: Sequence[Run], path: str) -> None:
+def save(problems: Sequence[BenchProblem], quantity: Quantity, runs: Sequence[BenchRun], path: str) -> None:
     """Draw one quantity of some problems into a file; its ending says the format. Raises OSError, ValueError."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -49,8 +49,8 @@ def save(problems: Sequence[BenchProblem], quantity: Quantity, runs: Sequence[Ru
 
 
 def _panel(
-    axes: Any, problem: BenchProblem, quantity: Quantity, runs: Sequence[Run], methods: Sequence[str], counted: bool,
-    handles: dict[str, Any],
+    axes: Any, problem: BenchProblem, quantity: Quantity, runs: Sequence[BenchRun], methods: Sequence[str],
+    counted: bool, handles: dict[str, Any],
 ) -> None:  # fmt: skip
     for index, method in enumerate(methods):
         mine = [r for r in runs if (r.problem, r.quantity, r.method) == (problem.id, quantity, method)]

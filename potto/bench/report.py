@@ -17,7 +17,7 @@ from msgspec import Struct
 from msgspec.structs import asdict
 
 from potto.bench.adapter import Adapter, installed
-from potto.bench.measure import Run, slope
+from potto.bench.measure import BenchRun, slope
 from potto.bench.problems import QUANTITIES, BenchProblem, Quantity, catalogue
 from potto.runtime.answers.printing import format_error
 
@@ -47,7 +47,7 @@ def header(adapters: Iterable[Adapter]) -> str:
     return "\n".join(lines)
 
 
-def table(problem: BenchProblem, quantity: Quantity, runs: Sequence[Run], measure: Measure = "time") -> str:
+def table(problem: BenchProblem, quantity: Quantity, runs: Sequence[BenchRun], measure: Measure = "time") -> str:
     """One problem as a table: per method what it needs for each accuracy, its best error, and what it says of that."""
     here = [run for run in runs if run.problem == problem.id and run.quantity == quantity]
     what = "milliseconds" if measure == "time" else "evaluations"
@@ -60,7 +60,7 @@ def table(problem: BenchProblem, quantity: Quantity, runs: Sequence[Run], measur
     return "\n".join(lines)
 
 
-def _row(rungs: Sequence[Run], measure: Measure) -> str:
+def _row(rungs: Sequence[BenchRun], measure: Measure) -> str:
     done = [run for run in rungs if not run.failure]
     if not done:
         return f" failed: {rungs[-1].failure}"
@@ -71,7 +71,7 @@ def _row(rungs: Sequence[Run], measure: Measure) -> str:
     return f"{''.join(f'{cell:>10}' for cell in cells)}   {best.error:>11.0e} {said:>9}{failed}"
 
 
-def needed(rungs: Sequence[Run], target: float) -> Run | None:
+def needed(rungs: Sequence[BenchRun], target: float) -> BenchRun | None:
     """The cheapest rung from which on every error is within the target: one lucky rung does not count."""
     found = None
     for run in reversed(rungs):
@@ -81,13 +81,13 @@ def needed(rungs: Sequence[Run], target: float) -> Run | None:
     return found
 
 
-def _cost(run: Run | None, measure: Measure) -> str:
+def _cost(run: BenchRun | None, measure: Measure) -> str:
     if run is None:
         return BLANK
     return f"{run.seconds * 1e3:.3g}" if measure == "time" else f"{run.evaluations:,}"
 
 
-def rates(runs: Sequence[Run], adapters: Iterable[Adapter]) -> list[Rate]:
+def rates(runs: Sequence[BenchRun], adapters: Iterable[Adapter]) -> list[Rate]:
     """The rates of convergence of methods that draw random numbers."""
     found: list[Rate] = []
     for adapter in adapters:
@@ -119,14 +119,14 @@ def rates_table(found: Sequence[Rate]) -> str:
     return "\n".join(lines)
 
 
-def write_csv(runs: Iterable[Run], stream: TextIO) -> None:
+def write_csv(runs: Iterable[BenchRun], stream: TextIO) -> None:
     """Every run as a row, all digits."""
-    writer = csv.DictWriter(stream, Run.__struct_fields__, lineterminator="\n")
+    writer = csv.DictWriter(stream, BenchRun.__struct_fields__, lineterminator="\n")
     writer.writeheader()
     writer.writerows(asdict(run) for run in runs)
 
 
-def as_json(runs: Sequence[Run], adapters: Sequence[Adapter]) -> dict[str, Any]:
+def as_json(runs: Sequence[BenchRun], adapters: Sequence[Adapter]) -> dict[str, Any]:
     """The report for machines."""
     methods = [{"name": a.name, "installed": a.missing() is None, "package": a.package} for a in adapters]
     return {

@@ -1,9 +1,9 @@
 """What was found out about a workspace, kept on disk, so that the next session begins with it.
 
-Owns `Keeper`, which writes it, and `Kept`, which reads it, both part by part: each takes milliseconds. Answers are
-kept as they travel between processes (`query/travel`), packed. So nothing is taken over that would not be found here:
-what was edited meanwhile is checked, and of what rests on it what is reached. There is one entry for a workspace; it is
-bounded as all of the store is.
+Owns `Keeper`, which writes it, and `KeptWorkspace`, which reads it, both part by part: each takes milliseconds. Answers
+are kept as they travel between processes (`query/travel`), packed. So nothing is taken over that would not be found
+here: what was edited meanwhile is checked, and of what rests on it what is reached. There is one entry for a workspace;
+it is bounded as all of the store is.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ class Keeper:
         return self._whole
 
 
-class Kept:
+class KeptWorkspace:
     """What an earlier session has found out about a workspace, for a database that has its files."""
 
     def __init__(self, db: Database, roots: Sequence[str]) -> None:

@@ -12,7 +12,7 @@ from potto.extras import install_command
 
 if TYPE_CHECKING:
     from potto.bench.adapter import Adapter
-    from potto.bench.measure import Run
+    from potto.bench.measure import BenchRun
     from potto.bench.problems import BenchProblem, Quantity
 
 SUMMARY = "measure speed against error, beside other integrators that are installed"
@@ -57,7 +57,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     seconds, rungs = (QUICK_SECONDS, QUICK_RUNGS) if options.quick else (options.seconds, None)
     if not options.json:
         console.answer(report.header(adapters))
-    runs: list[Run] = []
+    runs: list[BenchRun] = []
     for problem, quantity in itertools.product(chosen, quantities):
         console.progress(f"{problem.id}, {quantity} …")
         runs += measure([problem], adapters, [quantity], seconds, rungs)
@@ -74,7 +74,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
 
 
 def _files(
-    runs: list[Run], problems: list[BenchProblem], quantities: tuple[Quantity, ...], options: argparse.Namespace,
+    runs: list[BenchRun], problems: list[BenchProblem], quantities: tuple[Quantity, ...], options: argparse.Namespace,
     console: Console,
 ) -> int:  # fmt: skip
     """Write the files that were asked for."""

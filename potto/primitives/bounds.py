@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from potto.primitives.registry import EPS, Elementwise, Ends, Quantity, Truth
+from potto.primitives.registry import EPS, Elementwise, Ends, Quantity, WhereTrue
 
 # How near to a singularity of a function a disc may come, as a part of its centre's distance from it.
 NEAREST = 0.95
@@ -86,7 +86,7 @@ def wave(shift: float) -> Callable[[Elementwise, Ends], Ends]:
         sin, floor, turn = ops.of("sin"), ops.of("floor"), 2 * math.pi
         p, q = sin(lo), sin(hi)
 
-        def meets(place: float) -> Truth:
+        def meets(place: float) -> WhereTrue:
             return floor((hi + near - place) / turn) > floor((lo - near - place) / turn)
 
         whole = ops.where(ops.finite(lo) & ops.finite(hi), hi - lo >= turn, True)
@@ -147,7 +147,7 @@ def extreme(least: bool) -> Callable[..., Ends]:
 
 def between_turns(
     ops: Elementwise, op: str, within: tuple[float, float], turns: tuple[float, ...], a: Ends
-) -> tuple[Quantity, Quantity, Truth]:
+) -> tuple[Quantity, Quantity, WhereTrue]:
     """A builtin of the part of an interval on which it is defined, by its values at the ends and where it turns."""
     f = ops.of(op)
     lo, hi = ops.least(ops.most(a[0], within[0]), within[1]), ops.least(ops.most(a[1], within[0]), within[1])

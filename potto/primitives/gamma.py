@@ -10,7 +10,7 @@ import math
 
 from potto.core.terms import ONE, TWO, ZERO, add, const, mul, neg, prim
 from potto.primitives.bounds import clear
-from potto.primitives.registry import Elementwise, Ends, Primitive, Quantity, Truth, register
+from potto.primitives.registry import Elementwise, Ends, Primitive, Quantity, WhereTrue, register
 
 TOPIC = "The gamma function"
 POSITIVE = (0.0, math.inf)
@@ -59,7 +59,7 @@ def _zeta_remainder(ops: Elementwise, s: Quantity, m: Quantity, d: Quantity) -> 
     return 0.5 * d * d * s * (s + 1) * ops.of("hurwitz")(s + 2, clear(ops, m, d))
 
 
-def _zeta_bounds(ops: Elementwise, s: Ends, x: Ends) -> tuple[Quantity, Quantity, Truth]:
+def _zeta_bounds(ops: Elementwise, s: Ends, x: Ends) -> tuple[Quantity, Quantity, WhereTrue]:
     zeta = ops.of("hurwitz")
     return zeta(s[0], ops.most(x[1], 0.0)), zeta(s[0], ops.most(x[0], 0.0)), x[1] < 0
 

@@ -16,7 +16,7 @@ from edited_programs import WORKSPACE, edited
 from how_many import examples
 
 from potto.checking.check import diagnostics
-from potto.checking.kept import Keeper, Kept, parts_of
+from potto.checking.kept import Keeper, KeptWorkspace, parts_of
 from potto.checking.library import Library
 from potto.elaborate import core
 from potto.modules import names
@@ -73,7 +73,7 @@ def keep(library: Library, root: Path) -> None:
 
 
 def taken(library: Library, root: Path) -> list[str]:
-    kept = Kept(library.db, [str(root)])
+    kept = KeptWorkspace(library.db, [str(root)])
     found = list[str | None]()
     while kept.is_left:
         found.append(kept.take())

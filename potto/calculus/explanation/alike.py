@@ -1,7 +1,7 @@
 """A polynomial as a sum over what moves in it: each tangent with all that it is multiplied by, tangents that are
 multiplied by the same together.
 
-Owns `Alike`, `alike` and `content`.
+Owns `CollectedTerms`, `alike` and `content`.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from potto.core.polynomials import Exact, Monomial, Polynomial, shared_by, witho
 from potto.core.printer import format_term
 
 
-class Alike(Struct, frozen=True):
+class CollectedTerms(Struct, frozen=True):
     """shared * rest * moves: of all that is multiplied by the same what moves, each with its coefficient."""
 
     shared: Monomial
@@ -24,15 +24,15 @@ class Alike(Struct, frozen=True):
     moves: dict[Monomial, Exact]
 
 
-def alike(form: Polynomial, tangents: frozenset[str]) -> list[Alike]:
+def alike(form: Polynomial, tangents: frozenset[str]) -> list[CollectedTerms]:
     """The sum that a polynomial is, in the order of its monomials."""
     coefficients: dict[Monomial, dict[Monomial, Exact]] = {}
     for monomial, c in form.items():
         moving = tuple((a, n) for a, n in monomial if is_tangent(a, tangents))
         coefficients.setdefault(moving, {})[tuple(p for p in monomial if p not in moving)] = c
     if len(coefficients) == 1 and () in coefficients:
-        return [Alike((), coefficients[()], {(): 1})]
-    groups: dict[tuple[Monomial, frozenset[tuple[Monomial, Exact]]], Alike] = {}
+        return [CollectedTerms((), coefficients[()], {(): 1})]
+    groups: dict[tuple[Monomial, frozenset[tuple[Monomial, Exact]]], CollectedTerms] = {}
     for moving, coefficient in coefficients.items():
         shared = shared_by(list(coefficient))
         rest = {without(m, shared): c for m, c in coefficient.items()}
@@ -42,11 +42,11 @@ def alike(form: Polynomial, tangents: frozenset[str]) -> list[Alike]:
         key = tuple(shared.items()), frozenset(rest.items())
         opposite = key[0], frozenset((m, -c) for m, c in rest.items())
         known, sign = (opposite, -1) if opposite in groups else (key, 1)
-        groups.setdefault(known, Alike(key[0], rest, {})).moves[moving] = sign * scale
+        groups.setdefault(known, CollectedTerms(key[0], rest, {})).moves[moving] = sign * scale
     return list(map(_turned, groups.values()))
 
 
-def _turned(group: Alike) -> Alike:
+def _turned(group: CollectedTerms) -> CollectedTerms:
     """With fewer signs, if both sums may be turned: (x - y)*(da - db) for (y - x)*(db - da)."""
     if len(group.moves) < 2:
         return group
@@ -55,7 +55,7 @@ def _turned(group: Alike) -> Alike:
     if balance < 0 or (balance == 0 and group.moves[first] > 0):
         return group
     rest, moves = ({m: -c for m, c in form.items()} for form in (group.rest, group.moves))
-    return Alike(group.shared, rest, moves)
+    return CollectedTerms(group.shared, rest, moves)
 
 
 def content(form: Polynomial) -> Fraction:

@@ -69,7 +69,7 @@ def evaluate(
     with mp.workdps(digits + GUARD), _deep_recursion():
         values = {name: as_value(value) for name, value in (env or {}).items()}
         held = {place: as_value(value) for place, value in (data or {}).items()}
-        return Walk(lookup, digits, held).run(term, values)
+        return ReferenceWalk(lookup, digits, held).run(term, values)
 
 
 @contextlib.contextmanager
@@ -92,7 +92,7 @@ def as_value(value: Any) -> Value:
     return value if callable(value) or isinstance(value, bool) else mp.mpf(value)
 
 
-class Walk:
+class ReferenceWalk:
     """One evaluation: how definitions are found, how exact it is, and the trace that is being written."""
 
     def __init__(self, lookup: Lookup | None, digits: int, data: Mapping[tuple[str, str], Value]) -> None:
@@ -232,7 +232,7 @@ def _kinks(op: str, arity: int) -> tuple[Term, ...]:
 
 
 class _Closure(Struct, frozen=True):
-    oracle: Walk
+    oracle: ReferenceWalk
     term: Lam
     env: Environment
 

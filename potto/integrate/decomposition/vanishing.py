@@ -23,7 +23,7 @@ Numbers = Mapping[tuple[int, ...], tuple[Any, int]]  # groups, and orientations,
 NEVER, ALWAYS = 0, 1  # numbers of tests that need no sides
 
 
-class Side(Struct, frozen=True):
+class SideTest(Struct, frozen=True):
     """A test by the side of a group: the one above it, and the one below, by their numbers."""
 
     group: Any
@@ -32,7 +32,7 @@ class Side(Struct, frozen=True):
     orelse: int
 
 
-class Joined(Struct, frozen=True):
+class AllOrAny(Struct, frozen=True):
     """Whether all of some tests hold, or any of them does."""
 
     every: bool
@@ -43,7 +43,7 @@ class Vanishing(Struct, frozen=True):
     """A test on sides. rows: what it is made of, each once, from the parts to the whole, with numbers in this order
     behind NEVER and ALWAYS. whole: its own number. In a union of n regions 2^n ways lead through n rows."""
 
-    rows: tuple[Side | Joined, ...] = ()
+    rows: tuple[SideTest | AllOrAny, ...] = ()
     whole: int = NEVER
 
 
@@ -51,9 +51,9 @@ class _Rows:
     """Rows, as they are made."""
 
     def __init__(self) -> None:
-        self.numbers: dict[Side | Joined, int] = {}
+        self.numbers: dict[SideTest | AllOrAny, int] = {}
 
-    def number(self, row: Side | Joined) -> int:
+    def number(self, row: SideTest | AllOrAny) -> int:
         return self.numbers.setdefault(row, 1 + ALWAYS + len(self.numbers))
 
     def joined(self, every: bool, parts: Sequence[int]) -> int:
@@ -63,7 +63,7 @@ class _Rows:
         rest = tuple(part for part in parts if part != other)
         if not rest:
             return other
-        return rest[0] if len(rest) == 1 else self.number(Joined(every, rest))
+        return rest[0] if len(rest) == 1 else self.number(AllOrAny(every, rest))
 
     def test(self, whole: int) -> Vanishing:
         """The test of this number, with the rows that it is made of."""
@@ -77,14 +77,14 @@ class _Rows:
         return Vanishing(tuple(_renumbered(rows[number - 1 - ALWAYS], place) for number in kept), place[whole])
 
 
-def _parts(row: Side | Joined) -> tuple[int, ...]:
-    return row.parts if isinstance(row, Joined) else (row.then, row.orelse)
+def _parts(row: SideTest | AllOrAny) -> tuple[int, ...]:
+    return row.parts if isinstance(row, AllOrAny) else (row.then, row.orelse)
 
 
-def _renumbered(row: Side | Joined, place: Mapping[int, int]) -> Side | Joined:
-    if isinstance(row, Joined):
-        return Joined(row.every, tuple(place[part] for part in row.parts))
-    return Side(row.group, row.orientation, place[row.then], place[row.orelse])
+def _renumbered(row: SideTest | AllOrAny, place: Mapping[int, int]) -> SideTest | AllOrAny:
+    if isinstance(row, AllOrAny):
+        return AllOrAny(row.every, tuple(place[part] for part in row.parts))
+    return SideTest(row.group, row.orientation, place[row.then], place[row.orelse])
 
 
 def vanishing_of(
@@ -132,7 +132,7 @@ def _zero(
     place = numbers.get((index.get((node, 2), -1),)) if isinstance(node, Branch) else None
     if isinstance(node, Branch) and place is not None:
         then, orelse = memo[node.then], memo[node.orelse]
-        return NEVER if then == orelse == NEVER else rows.number(Side(*place, then, orelse))
+        return NEVER if then == orelse == NEVER else rows.number(SideTest(*place, then, orelse))
     every, parts = zero_with(node)
     return rows.joined(every, [memo[part] for part in parts])
 
@@ -165,7 +165,7 @@ def zero_on(test: Vanishing, sides: Mapping[int, Mask]) -> Mask:
     """Evaluate a vanishing test on sides: False, True or a mask."""
     found: list[Mask] = [False, True]
     for row in test.rows:
-        if isinstance(row, Joined):
+        if isinstance(row, AllOrAny):
             first, *rest = row.parts
             value = found[first]
             for part in rest:
@@ -188,7 +188,7 @@ def held(test: Vanishing) -> dict[Any, int]:
     """The groups of which one side has to hold, 1 or -1, where an integrand does not vanish."""
     found: list[dict[Any, int]] = [{}, {}]
     for row in test.rows:
-        if isinstance(row, Side):
+        if isinstance(row, SideTest):
             if row.then == ALWAYS:
                 own = {**found[row.orelse], row.group: -row.orientation}
             else:

@@ -18,7 +18,7 @@ from msgspec import Struct
 from potto.core.terms import Const, children
 from potto.integrate.fixed.moving_sums import any_moves, columns_of
 from potto.integrate.fixed.steps.step_integral import StepIntegral
-from potto.integrate.fixed.steps.step_sides import Passed, Sides, layout, same_leads, sides_of, taken
+from potto.integrate.fixed.steps.step_sides import StepPlaces, StepSides, layout, same_leads, sides_of, taken
 from potto.integrate.fixed.straight import CLEAR
 from potto.integrate.pieces import Evaluator, numbers_at
 from potto.integrate.rules.gauss import EPS
@@ -31,7 +31,7 @@ WHOLE = 2.0**53  # below which sums of whole numbers are exact
 Height = tuple[Array, Array | None]
 
 
-class Arrangement(Struct, frozen=True):
+class StepArrangement(Struct, frozen=True):
     """What follows from the order of the rows of a frame, and from signs that are asked for, of one member or of B.
 
     rows: from bound to bound ([B,] C + 1), so many of which count. passed, sides, taken: as of `StepCells`. resting:
@@ -41,8 +41,8 @@ class Arrangement(Struct, frozen=True):
 
     rows: Ints
     count: Ints
-    passed: Passed
-    sides: Sides
+    passed: StepPlaces
+    sides: StepSides
     taken: tuple[tuple[Ints, ...], ...]
     resting: tuple[Height | None, ...]
     order: Ints
@@ -69,8 +69,8 @@ class StepCells(Struct, frozen=True):
     inside: Ints
     lower: Ints
     upper: Ints
-    passed: Passed
-    sides: Sides
+    passed: StepPlaces
+    sides: StepSides
     taken: tuple[tuple[Ints, ...], ...]
 
     def pick(self, cells: Any) -> StepCells:
@@ -122,9 +122,9 @@ def cells_between(
 
 def _still_so(
     plan: StepIntegral, places: Array, errors: Array, machine: Evaluator, env: Mapping[str, Value]
-) -> Arrangement | None:
+) -> StepArrangement | None:
     """The arrangement that one member had last, if it is that of another one, too: as many comparisons as cuts."""
-    found: Arrangement | None = plan.arrangements.get(0)
+    found: StepArrangement | None = plan.arrangements.get(0)
     if found is None:
         return None
     at, off = places[found.order], CLEAR * errors[found.order]
@@ -137,7 +137,7 @@ def _still_so(
 
 def _arranged(
     plan: StepIntegral, places: Array, errors: Array, machine: Evaluator, env: Mapping[str, Value]
-) -> Arrangement:
+) -> StepArrangement:
     """The arrangement of places and errors ([B,] R)."""
     sides = sides_of(plan, places, machine, env)
     _absent(places, errors)
@@ -150,7 +150,7 @@ def _arranged(
         for own, known in enumerate(numbers)
     ])  # fmt: skip
     order, there = places.argsort(axis=-1), int((~np.isnan(places)).sum())
-    return Arrangement(rows, count, passed, sides, chosen, resting, order[..., :there], order[..., there:])
+    return StepArrangement(rows, count, passed, sides, chosen, resting, order[..., :there], order[..., there:])
 
 
 def levels_of(plan: StepIntegral, machine: Evaluator, env: Mapping[str, Value]) -> list[tuple[Cell, ...]]:
@@ -249,7 +249,7 @@ def _along(block: Array, rows: Ints) -> Array:
     return block.take(rows, axis=-1) if rows.ndim == 1 else np.take_along_axis(block, rows[None], -1)
 
 
-def _passed(rows: Ints, count: Ints, number: int) -> Passed:
+def _passed(rows: Ints, count: Ints, number: int) -> StepPlaces:
     """Where the rows of a frame, so many, come in their order ([B,] C + 1), of which so many count."""
     cells = rows.shape[-1] - 1
     place = np.full((*rows.shape[:-1], number + 1), cells)
@@ -259,12 +259,13 @@ def _passed(rows: Ints, count: Ints, number: int) -> Passed:
         at = np.broadcast_to(np.arange(1, cells), (len(rows), cells - 1))
         cut = at < count[:, None] - 1
         np.put_along_axis(place, np.where(cut, rows[:, 1:-1], number), np.where(cut, at, cells), -1)
-    return Passed(place, cells)
+    return StepPlaces(place, cells)
 
 
 def _height(
-    plan: StepIntegral, own: int, numbers: Array, errors: Array, sides: Sides, passed: Passed, chosen: Sequence[Ints]
-) -> Height:
+    plan: StepIntegral, own: int, numbers: Array, errors: Array, sides: StepSides, passed: StepPlaces,
+    chosen: Sequence[Ints],
+) -> Height:  # fmt: skip
     """A step function on the cells, and how far that is off, with tangents if it has any: its height on the first one,
     and what it changes at the cuts that are passed, further and further up; then the values of choices."""
     step = plan.steps[own]

@@ -1,6 +1,6 @@
 """What nested conditions choose between, as counts: which of several values an integrand has is told along the cuts.
 
-Owns `Choice`, `Alternative`, `Heads` and `choice_of`. In `if A then 1 else if B then 1 else ... 0` whichever holds
+Owns `StepChoice`, `Alternative`, `Heads` and `choice_of`. In `if A then 1 else if B then 1 else ... 0` whichever holds
 decides, and what is looked at first goes over to the rest, if it does not. Such a piece of the graph, which decides or
 goes over to one other, is a head: a function of few conditions, so that it changes at few cuts. Heads that lead to the
 same value, one after the other, lead to it where the number of those that do is not 0. So a union of n regions costs as
@@ -49,7 +49,7 @@ class Alternative(Struct, Generic[Surface], frozen=True, eq=False):
     heads: tuple[Heads[Surface], ...]
 
 
-class Choice(Struct, Generic[Surface], frozen=True, eq=False):
+class StepChoice(Struct, Generic[Surface], frozen=True, eq=False):
     """The first of some alternatives to which something leads; else another value."""
 
     alternatives: tuple[Alternative[Surface], ...]
@@ -59,14 +59,14 @@ class Choice(Struct, Generic[Surface], frozen=True, eq=False):
     def values(self) -> tuple[Term, ...]:
         return (*(alternative.value for alternative in self.alternatives), self.otherwise)
 
-    def numbered(self, numbers: Mapping[Surface, int]) -> Choice[int]:
+    def numbered(self, numbers: Mapping[Surface, int]) -> StepChoice[int]:
         """The same with numbers for surfaces."""
 
         def heads(own: Heads[Surface]) -> Heads[int]:
             return Heads(own.nodes, tuple(tuple(numbers[surface] for surface in each) for each in own.surfaces))
 
         found = (Alternative(each.value, tuple(map(heads, each.heads))) for each in self.alternatives)
-        return Choice(tuple(found), self.otherwise)
+        return StepChoice(tuple(found), self.otherwise)
 
 
 class _Head(Struct):
@@ -81,7 +81,7 @@ class _Head(Struct):
         return list(dict.fromkeys(ends))
 
 
-def choice_of(whole: Branch, variable: str) -> Choice[Term]:
+def choice_of(whole: Branch, variable: str) -> StepChoice[Term]:
     """A condition with conditions in its cases, by the canonical forms of its surfaces. What varies is one of these,
     what does not is a value."""
     place = {node: number for number, node in enumerate(postorder(whole))}
@@ -99,7 +99,7 @@ def choice_of(whole: Branch, variable: str) -> Choice[Term]:
             if not found or found[-1][0] is not value:
                 found.append((value, []))
             found[-1][1].append(_form(head, value))
-    return Choice(tuple(Alternative(value, _alike(forms)) for value, forms in found), otherwise)
+    return StepChoice(tuple(Alternative(value, _alike(forms)) for value, forms in found), otherwise)
 
 
 def _head(first: Branch, place: Mapping[Term, int], variable: str) -> _Head:

@@ -46,7 +46,7 @@ from potto.core.terms import (
     var,
 )
 from potto.integrate.fixed.root_choices import choices_of, smooth
-from potto.integrate.fixed.steps.step_choices import Choice, choice_of
+from potto.integrate.fixed.steps.step_choices import StepChoice, choice_of
 from potto.integrate.rules.complex_enclosures import enclosable
 from potto.primitives import PRIMITIVES
 
@@ -70,7 +70,7 @@ class StepFunction(Struct, frozen=True, eq=False):
     """What adds up to it. alone: surfaces of conditions that count on their own."""
 
     alone: tuple[int, ...]
-    choices: tuple[Choice[int], ...]
+    choices: tuple[StepChoice[int], ...]
 
     @property
     def heights(self) -> int:
@@ -291,12 +291,12 @@ def _of_one_sign(term: Term) -> bool:
 
 
 @lru_cache(maxsize=256)
-def _heights(line: Term, variable: str) -> tuple[tuple[Term, ...], tuple[Choice[Term], ...], tuple[Term, ...]]:
+def _heights(line: Term, variable: str) -> tuple[tuple[Term, ...], tuple[StepChoice[Term], ...], tuple[Term, ...]]:
     """The surfaces that count on their own in a step function, and the choices, by the canonical forms of surfaces; and
     what it is made of: many are added up by numbers alone, with less rounding than that of a term."""
     rest: list[Term] = []
     alone: dict[Term, tuple[list[Term], list[Term]]] = {}
-    choices: list[Choice[Term]] = []
+    choices: list[StepChoice[Term]] = []
     values: list[Term] = []
     todo: list[tuple[Term, Term]] = [(line, ONE)]
     while todo:

@@ -1,9 +1,9 @@
 """On which sides of their surfaces the cells of a `StepIntegral` lie: how it is on the first one, and at which cuts it
 changes.
 
-Owns `Passed`, `Sides` with `sides_of`, and `taken`, which values are chosen. Of a polynomial all of whose roots are
-rows the coefficient of the highest power tells its sign far away, and each root turns it round. Any other surface is
-asked in the middle between its own cuts: all of them together once more than there are cuts, not once a cell. Where
+Owns `StepPlaces`, `StepSides` with `sides_of`, and `taken`, which values are chosen. Of a polynomial all of whose roots
+are rows the coefficient of the highest power tells its sign far away, and each root turns it round. Any other surface
+is asked in the middle between its own cuts: all of them together once more than there are cuts, not once a cell. Where
 rounding hides a sign, or there is no value, that is not sure.
 """
 
@@ -18,14 +18,14 @@ from msgspec import Struct
 from numpy.typing import NDArray
 
 from potto.core.terms import Const, children
-from potto.integrate.fixed.steps.step_choices import Choice, Heads
+from potto.integrate.fixed.steps.step_choices import Heads, StepChoice
 from potto.integrate.fixed.steps.step_integral import StepIntegral, asked_between, probe
 from potto.integrate.fixed.straight import CLEAR
 from potto.integrate.pieces import Evaluator, numbers_at, resting
 from potto.kernels.cells import Array, Bools, Cell, Ints, Value
 
 
-class Passed(Struct, frozen=True):
+class StepPlaces(Struct, frozen=True):
     """Where rows of a frame come in the order of its cuts. place: ([B,] R + 1), of R rows and one that stands for none:
     the first cell above a cut, the number of cells for what is none. cells: how many."""
 
@@ -43,7 +43,7 @@ class Passed(Struct, frozen=True):
         return np.cumsum(found[..., :-1], axis=-1)
 
 
-class Sides(Struct, frozen=True):
+class StepSides(Struct, frozen=True):
     """first: ([B,] S), whether the first cell is above each surface. change: ([B,] S, M), 1 or -1 where the sign of
     one changes at its rows, else 0. sure: for whom all that is known. leads: ([B,] T), whether leading coefficients
     that were asked for are above 0. between: whether surfaces were asked between their rows."""
@@ -96,7 +96,7 @@ def layout(plan: StepIntegral, there: bool = True) -> _Layout:
     return _Layout(rows, by_degree, np.array(signs), np.array(leads, dtype=int), groups, tuple(probes), untold)
 
 
-def sides_of(plan: StepIntegral, places: Array, machine: Evaluator, env: Mapping[str, Value]) -> Sides:
+def sides_of(plan: StepIntegral, places: Array, machine: Evaluator, env: Mapping[str, Value]) -> StepSides:
     """places: ([B,] R), of the rows of the frame, nan for a root that is not there."""
     untold, shape = layout(plan).untold, places.shape[:-1]
     complete = not (untold.size and np.isnan(places[..., untold]).any())
@@ -126,10 +126,10 @@ def sides_of(plan: StepIntegral, places: Array, machine: Evaluator, env: Mapping
         back = np.empty_like(turned)
         np.put_along_axis(back, order, turned, -1)
         change[..., own, : back.shape[-1]] = back
-    return Sides(first, change, sure, above[..., :leads], bool(stretches))
+    return StepSides(first, change, sure, above[..., :leads], bool(stretches))
 
 
-def same_leads(plan: StepIntegral, sides: Sides, machine: Evaluator, env: Mapping[str, Value]) -> bool:
+def same_leads(plan: StepIntegral, sides: StepSides, machine: Evaluator, env: Mapping[str, Value]) -> bool:
     """Whether the leading coefficients of one member, which are all that is asked for, have the signs that they have
     for these sides."""
     above, clear = _asked(plan, True, (), (), machine, env)
@@ -180,7 +180,7 @@ def _asked(
     return both[0] > 0, np.abs(both[0]) > CLEAR * both[1]
 
 
-def taken(plan: StepIntegral, choice: Choice[int], sides: Sides, passed: Passed) -> Ints:
+def taken(plan: StepIntegral, choice: StepChoice[int], sides: StepSides, passed: StepPlaces) -> Ints:
     """The number of the value that is chosen on each cell, ([B,] C)."""
     found = np.full((*sides.sure.shape, passed.cells), len(choice.alternatives))
     for number in range(len(choice.alternatives) - 1, -1, -1):
@@ -189,7 +189,7 @@ def taken(plan: StepIntegral, choice: Choice[int], sides: Sides, passed: Passed)
     return found
 
 
-def _led(plan: StepIntegral, heads: Heads[int], sides: Sides, passed: Passed) -> Ints:
+def _led(plan: StepIntegral, heads: Heads[int], sides: StepSides, passed: StepPlaces) -> Ints:
     """How many heads lead to their value on each cell: each is asked below and above its own cuts."""
     own, rows, once = _own_rows(plan, heads)
     cuts = passed.place[..., rows]  # ([B,] H, m M)
