@@ -1,13 +1,15 @@
 """Core terms as text that reads like Potto.
 
-Owns `format_term` and `format_equation`. The text has the parentheses that its meaning needs and no others; a branch
-between 1 and 0 is an Iverson bracket, its surface turned so that it reads as a comparison (`[x < t]` for t - x).
+Owns `format_term`, `format_equation` and `sides_of`. The text has the parentheses that its meaning needs, and those
+around integrals and sums among factors; a branch between 1 and 0 is an Iverson bracket, its surface turned so that it
+reads as a comparison (`[x < t]` for t - x).
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterable
+from functools import reduce
 
 from msgspec import Struct
 
@@ -40,6 +42,7 @@ from potto.core.terms import (
     Tuple,
     Var,
     postorder,
+    unknown,
 )
 
 # How tightly a text holds together; an operand looser than its place needs parentheses.
@@ -51,12 +54,22 @@ _NAME = re.compile(r"[^\W\d][\w.]*")  # or a part of what has one
 _LIKE_A_HEAD = re.compile(r"[^\W\d][\w']*\.\d")  # `c.2`, which begins a function of c where a function's head ends
 
 
+class _Chain(Struct, frozen=True):
+    """What a condition begins with, `low < ... < high`: `rising` is its text, `rest` what comes after it."""
+
+    low: str
+    high: str
+    rising: str
+    rest: str
+
+
 class _Text(Struct, frozen=True):
-    """A printed term, and if it is 1 or 0 by a condition, that condition."""
+    """A printed term; if it is 1 or 0 by a condition, that condition; if it is one, the comparisons it begins with."""
 
     text: str
     holds: int
     condition: _Text | None = None
+    chain: _Chain | None = None
 
     def at(self, place: int) -> str:
         return self.text if self.holds >= place else f"({self.text})"
@@ -109,14 +122,30 @@ def format_equation(surface: Term, variables: Iterable[str] = (), numbers: Numbe
     return " = ".join(sorted(sorted((less, more), reverse=True), key=place))
 
 
+def sides_of(surface: Term) -> tuple[str, str]:
+    """The lower and the higher side of `surface > 0` as it is written: `x` and `t` for t - x."""
+    less, more, _ = _sides(surface, _texts(surface, _LIMIT, Numbers.STORED))
+    return less, more
+
+
+# What terms without copies are written as: whoever looks for the shortest formula asks for the same parts all the time.
+_KNOWN: dict[tuple[int, Numbers], _Texts] = {}
+_KEPT = 1 << 14
+
+
 def _texts(term: Term, limit: int, numbers: Numbers) -> _Texts:
-    texts: _Texts = {}
-    nodes = tuple(postorder(term))
+    known = _KNOWN.setdefault((limit, numbers), {})
+    if len(known) > _KEPT:
+        known.clear()
+    nodes: tuple[Term, ...] = tuple(unknown(term, known))
     names = names_of_copies(nodes)
+    if names:
+        known, nodes = {}, tuple(postorder(term))
+        names = names_of_copies(nodes)
     for node in nodes:
-        text = _number(node, numbers) or _node(node if not names else renamed(node, names), texts)
-        texts[node] = text if len(text.text) <= limit else _Text(LEFT_OUT, _ATOM)
-    return texts
+        text = _number(node, numbers) or _node(node if not names else renamed(node, names), known)
+        known[node] = text if len(text.text) <= limit else _Text(LEFT_OUT, _ATOM)
+    return known
 
 
 @short_text.register(Base)
@@ -248,7 +277,8 @@ def _builtin(node: Prim, texts: _Texts) -> _Text:
 
 
 def _product(sign: str, parts: list[_Text]) -> _Text:
-    first = parts[0].at(_SIGN)  # a minus sign in front of the first factor is one in front of the product
+    # A minus sign in front of the first factor is one in front of the product.
+    first = parts[0].at(_SIGN if parts[0].text.startswith("-") else _MUL)
     return _Text(sign.join([first, *(p.at(_POW) for p in parts[1:])]), _SIGN if first.startswith("-") else _MUL)
 
 
@@ -274,9 +304,11 @@ def _branch(node: Branch, texts: _Texts) -> _Text:
         return _Text(f"[{condition.text}]", _ATOM, condition)
     if len(node.coordinates) > 1 and not node.strict:
         return _Text(f"if diffeo({_list(node.coordinates, texts)}) then {then.text} else {orelse.text}", _OPEN)
-    test, inner = _comparison(node, True, texts), node.then
+    tests, inner = [_comparison(node, True, texts)], node.then
     while isinstance(inner, Branch) and inner.orelse is node.orelse and len(inner.coordinates) == 1:
-        test, inner = _joined("and", test, _comparison(inner, True, texts)), inner.then
+        tests.append(_comparison(inner, True, texts))
+        inner = inner.then
+    test = reduce(lambda rest, first: _joined("and", first, rest), reversed(tests))
     return _Text(f"if [{test.text}] then {texts[inner].text} else {orelse.text}", _OPEN)
 
 
@@ -298,17 +330,27 @@ def _combined(node: Branch, then: _Text, orelse: _Text, texts: _Texts) -> _Text 
 
 
 def _joined(word: str, first: _Text, second: _Text) -> _Text:
+    """Both conditions, or one of them; what two comparisons share stands between them: `0 < x < 1`."""
     place = _LOGIC[word]
-    return _Text(f"{first.at(place)} {word} {second.at(place)}", place)
+    a, b = first.chain, second.chain
+    if word == "and" and a and b and a.high == b.low and not a.rest:
+        rising = a.rising + b.rising.removeprefix(b.low)
+        chain = _Chain(a.low, b.high, rising, b.rest)
+        return _Text(rising + b.rest, place if b.rest else _COMPARE, None, chain)
+    rest = f" {word} {second.at(place)}"
+    leads = _Chain(a.low, a.high, a.rising, a.rest + rest) if a and word == "and" else None
+    return _Text(first.at(place) + rest, place, None, leads)
 
 
 def _comparison(node: Branch, holds: bool, texts: _Texts) -> _Text:
     """That a branch's surface is on the side of `then` (or of `orelse`), as a comparison."""
     less, more, greater_first = _sides(node.surface, texts)
     equals = "" if node.strict == holds else "="
-    if greater_first:
-        return _Text(f"{more} {'>' if holds else '<'}{equals} {less}", _COMPARE)
-    return _Text(f"{less} {'<' if holds else '>'}{equals} {more}", _COMPARE)
+    low, high = (less, more) if holds else (more, less)
+    chain = _Chain(low, high, f"{low} <{equals} {high}", "")
+    if greater_first == holds:
+        return _Text(f"{high} >{equals} {low}", _COMPARE, None, chain)
+    return _Text(chain.rising, _COMPARE, None, chain)
 
 
 def _sides(surface: Term, texts: _Texts) -> tuple[str, str, bool]:

@@ -7,11 +7,11 @@ from formulas import Shown, near
 
 COLLECTED = [
     # a factor of all summands, in a sum and in a sum that is a factor
-    ("t*sin(c) + c*t^2*sin(c)", "sin(c)*(2*c*t + 1)*dt + t*(cos(c) + t*sin(c) + c*t*cos(c))*dc"),
+    ("t*sin(c) + c*t^2*sin(c)", "(2*c*t + 1)*sin(c)*dt + t*(cos(c) + t*sin(c) + c*t*cos(c))*dc"),
     # a tangent, though what it is multiplied by has no common denominator without a root
     ("1.8*t*cos(3 - acos(t))", "1.8*(cos(3 - acos(t)) - t*sin(3 - acos(t))/sqrt(1 - t^2))*dt"),
     # brackets of what is otherwise alike
-    ("integral [t, t + 1] [abs(x - t) < c/3] d(x)", "dt*([c > 3] - [c > 0]) + (dc/3 + dt)*[c > 0 and c < 3]"),
+    ("integral [t, t + 1] [abs(x - t) < c/3] d(x)", "dt*([c > 3] - [c > 0]) + (dc/3 + dt)*[0 < c < 3]"),
     # sizes of products, and the larger of two
     ("integral [-c, t^2] abs(x - c) d(x)", "2*abs(c)"),
     ("integral [-c, t] max(x, c) d(x)", "(integral [-c, t] [x < c] d(x) + abs(c))*dc + max(t, c)*dt"),
@@ -20,20 +20,20 @@ COLLECTED = [
         "integral [0, t] (2*c - x)*[(x - t)^2 < 0.04] d(x)",
         "(2*c - t + (t - 0.2 - 2*c)*[t > 0.2] + (t + 0.2 - 2*c)*[t < -0.2])*dt",
     ),
-    ("integral [0, 3] [x^2 - 3*x + t < 0] d(x)", "if [t > 0 and t < 9/4] then -2*dt/sqrt(9 - 4*t) else 0"),
+    ("integral [0, 3] [x^2 - 3*x + t < 0] d(x)", "if [0 < t < 9/4] then -2*dt/sqrt(9 - 4*t) else 0"),
     # squares
     ("integral [c/4, 1] x*[(x - t)^2 < 0.04] d(x)", "[(c/4 - t)^2 < 0.04]"),
     (
         "sum i in 0..2 (integral [0, 1] [x^2 < t*c/(i + 1)]*x d(x))",
-        "(1/(i + 1)*[c*t/(i + 1) > 0 and c*t/(i + 1) < 1]))/2",
+        "(1/(i + 1)*[0 < c*t/(i + 1) < 1]))/2",
     ),
     # what does not depend on the variables before the integral
-    ("integral ([0, 1], [0, 1]) cos(t)*[x + y < t] d(x, y)", "cos(t)*(integral [0, 1] [x < t and t < x + 1] d(x))"),
+    ("integral ([0, 1], [0, 1]) cos(t)*[x + y < t] d(x, y)", "cos(t)*(integral [0, 1] [x < t < x + 1] d(x))"),
     # numbers that were halved often
     ("exp(c*(integral [c/4, 1] 0.5*x*t d(x)))", "/32"),
     # of which the larger one is known
     ("integral [0, 1] [cos(2*x + t) > c] d(x)", "sum k in ceil((t - acos(c))/(2*pi))..floor((t - acos(c) + 2)/(2*pi))"),
-    ("integral [0, 1] [12*x < 5*t]*c d(x)", "5*c*dt/12*[t > 0 and t < 12/5]"),
+    ("integral [0, 1] [12*x < 5*t]*c d(x)", "5*c*dt/12*[0 < t < 12/5]"),
 ]
 
 

@@ -8,6 +8,7 @@ import pytest
 
 from potto.calculus.explanation.explain import DerivativeText, describe, explain_derivative
 from potto.calculus.explanation.notation import Notation
+from potto.checking.library import Library
 from potto.core.terms import Global, Term
 from potto.elaborate import core
 from potto.query import Database
@@ -163,9 +164,21 @@ def test_a_long_formula_gives_way_while_it_is_written() -> None:
     def resolve(target: Global) -> Term:
         return core(db, target.module, target.name).term
 
-    assert describe(term, "f", "", resolve, Notation()).tangent == "exp(c + c^2)*(2*c + 1)*dc"
+    assert describe(term, "f", "", resolve, Notation()).tangent == "(2*c + 1)*exp(c + c^2)*dc"
     with pytest.raises(Enough):
         describe(term, "f", "", resolve, Notation(), pause)
+
+
+def test_a_recursion_in_an_integral_that_has_no_end_is_told() -> None:
+    """How deep it goes is a matter of values, and each step of it derives the next one under the integral."""
+    library = Library()
+    text = """
+def over(y, a) [y > a]
+def often(n, y, a) if n > 0 then often(n - 1, y, a) + n*snd(deriv(over)((y, 0), (a, 1))) else 0
+def f(n, a) integral [0, 1] often(n, x, a) d(x)
+"""
+    found = explain_derivative(library.db, library.put("<text>", text), "f")
+    assert not found.tangent and "as deep as its arguments say" in found.problems[0]
 
 
 def test_roots_are_named_where_they_exist() -> None:

@@ -20,7 +20,8 @@ COLLECTED = [
     (  # the mean of x under the density exp(-t*x) falls by its variance
         "(integral [0, 1] x*exp(-t*x) d(x))/(integral [0, 1] exp(-t*x) d(x))",
         "((integral [0, 1] x*exp(-t*x) d(x))^2"
-        " - integral [0, 1] x^2*exp(-t*x) d(x)*(integral [0, 1] exp(-t*x) d(x)))*dt/(integral [0, 1] exp(-t*x) d(x))^2",
+        " - (integral [0, 1] x^2*exp(-t*x) d(x))*(integral [0, 1] exp(-t*x) d(x)))"
+        "*dt/(integral [0, 1] exp(-t*x) d(x))^2",
     ),
     # a variable that an inner integral has as well, or a parameter has, is told apart
     (
@@ -43,26 +44,26 @@ def test_conditions_have_the_order_of_the_program_behind_those_of_the_domain() -
     shown = Shown("def f(a, b, t) integral ([0, 1], [0, 1]) [x < t]*[a < y]*[y < b] d(x, y)\n", "f").text
     (item,) = shown.integrals
     assert item.deltas == (
-        "dt*[a < y and y < b]*delta(t - x)",
+        "dt*[a < y < b]*delta(t - x)",
         "-da*[x < t and y < b]*delta(y - a)",
         "db*[x < t and a < y]*delta(b - y)",
     )
     assert shown.tangent == (
-        "dt*(integral [0, 1] [t > 0 and t < 1 and a < y and y < b] d(y))"
-        " - da*(integral [0, 1] [a > 0 and a < 1 and x < t and a < b] d(x))"
-        " + db*(integral [0, 1] [b > 0 and b < 1 and x < t and a < b] d(x))"
+        "dt*(integral [0, 1] [0 < t < 1 and a < y < b] d(y))"
+        " - da*(integral [0, 1] [0 < a < 1 and x < t and a < b] d(x))"
+        " + db*(integral [0, 1] [0 < b < 1 and x < t and a < b] d(x))"
     )
 
 
 NUMBERS = [
-    ("integral [-1/2, 1/2] [x < t]*(x + 1/2) d(x)", "(t + 1/2)*dt*[t > -1/2 and t < 1/2]"),
-    ("integral [-0.5, 0.5] [x < t]*(x + 0.5) d(x)", "(t + 0.5)*dt*[t > -0.5 and t < 0.5]"),
-    ("integral [0, 1] [2*x < t]*x d(x)", "t*dt/4*[t > 0 and t < 2]"),
-    ("integral [0, 1] [x/2 < t] d(x)", "2*dt*[t > 0 and t < 1/2]"),  # of whole numbers alone
-    ("integral [0, 1] [0.1*x < t] d(x)", "10*dt*[t > 0 and t < 0.1]"),
-    ("integral [0, 1/3] [x < t] d(x)", "dt*[t > 0 and t < 1/3]"),
-    ("integral [0, 1/10] [x < t] d(x)", "dt*[t > 0 and t < 1/10]"),
-    ("integral [-1/3, 1/3] [x < t] d(x)", "dt*[t > -1/3 and t < 1/3]"),
+    ("integral [-1/2, 1/2] [x < t]*(x + 1/2) d(x)", "(t + 1/2)*dt*[-1/2 < t < 1/2]"),
+    ("integral [-0.5, 0.5] [x < t]*(x + 0.5) d(x)", "(t + 0.5)*dt*[-0.5 < t < 0.5]"),
+    ("integral [0, 1] [2*x < t]*x d(x)", "t*dt/4*[0 < t < 2]"),
+    ("integral [0, 1] [x/2 < t] d(x)", "2*dt*[0 < t < 1/2]"),  # of whole numbers alone
+    ("integral [0, 1] [0.1*x < t] d(x)", "10*dt*[0 < t < 0.1]"),
+    ("integral [0, 1/3] [x < t] d(x)", "dt*[0 < t < 1/3]"),
+    ("integral [0, 1/10] [x < t] d(x)", "dt*[0 < t < 1/10]"),
+    ("integral [-1/3, 1/3] [x < t] d(x)", "dt*[-1/3 < t < 1/3]"),
     ("integral [0, 1] [x < (1/2)^t]*(3/4)^x d(x)", "(3/4)^(1/2)^t*(1/2)^t*log(1/2)*dt*[(1/2)^t < 1]"),
 ]
 

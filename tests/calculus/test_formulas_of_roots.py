@@ -16,8 +16,7 @@ from potto.core.terms import prim, var
 PERIODIC = [
     (
         "integral [0, 10] [sin(3*x) < t]*x d(x)",
-        "sum k in 0..5 (if [t > -1 and t < 1 and asin(t) + 2*pi*k > 0 and asin(t) + 2*pi*k < 30]"
-        " then (asin(t) + 2*pi*k)/sqrt(1 - t^2) else 0)",
+        "sum k in 0..5 (if [-1 < t < 1 and 0 < asin(t) + 2*pi*k < 30] then (asin(t) + 2*pi*k)/sqrt(1 - t^2) else 0)",
     ),
     ("integral [0, 3] [tan(x) < t]*x d(x)", "(atan(t)*[t > 0] + (atan(t) + pi)*[atan(t) + pi < 3])*dt/(t^2 + 1)"),
     ("integral [0, 7] [sin(x^2) < t]*x d(x)", "1/sqrt(1 - t^2)"),

@@ -14,7 +14,7 @@ from potto.checking.typeset import derivative_latex
 
 WHOLE = (
     "let D = b^2 - 4*a*c; x1 = -(b + sqrt(D))/(2*a); x2 = (sqrt(D) - b)/(2*a) in if [D > 0] then"
-    " -((x1^2*da + x1*db + dc)*[x1 > 0 and x1 < 1] + (x2^2*da + x2*db + dc)*[x2 > 0 and x2 < 1])/sqrt(D) else 0"
+    " -((x1^2*da + x1*db + dc)*[0 < x1 < 1] + (x2^2*da + x2*db + dc)*[0 < x2 < 1])/sqrt(D) else 0"
 )
 
 
@@ -122,8 +122,8 @@ def test_names_of_roots_are_no_parameters_and_no_functions() -> None:
 @pytest.mark.parametrize(
     ("program", "read"),
     [
-        ("integral [-1, 1] [x^2 < t]*x^2 d(x)", "if [t >= 0 and t < 1] then sqrt(t)*dt else 0"),
-        ("integral [0, 3] [x^2 - 3*x + t < 0] d(x)", "if [t > 0 and t < 9/4] then -2*dt/sqrt(9 - 4*t) else 0"),
+        ("integral [-1, 1] [x^2 < t]*x^2 d(x)", "if [0 <= t < 1] then sqrt(t)*dt else 0"),
+        ("integral [0, 3] [x^2 - 3*x + t < 0] d(x)", "if [0 < t < 9/4] then -2*dt/sqrt(9 - 4*t) else 0"),
     ],
 )
 def test_what_is_shorter_without_names_has_none(program: str, read: str) -> None:

@@ -23,11 +23,10 @@ TEXTBOOK = {
     ),
     "potential": ("1/sqrt(a^2 + b^2)", "-(a*da + b*db)/(a^2 + b^2)^(3/2)"),
     "cube": ("a^3 - 3*a^2*b + 3*a*b^2 - b^3", "3*(a - b)^2*(da - db)"),
-    "arccosine": ("integral [0, pi] [cos(x) < a] d(x)", "if [a > -1 and a < 1] then da/sqrt(1 - a^2) else 0"),
+    "arccosine": ("integral [0, pi] [cos(x) < a] d(x)", "if [-1 < a < 1] then da/sqrt(1 - a^2) else 0"),
     "area of a disc beside the origin": (
         "integral ([-3, 3], [-3, 3]) [(x - a)^2 + y^2 < b^2] d(x, y)",
-        "2*(integral [-3, 3] ((x - a)*da + b*db)/sqrt(b^2 - (x - a)^2)"
-        "*[(x - a)^2 <= b^2 and b^2 < (x - a)^2 + 9] d(x))",
+        "2*(integral [-3, 3] ((x - a)*da + b*db)/sqrt(b^2 - (x - a)^2)*[(x - a)^2 <= b^2 < (x - a)^2 + 9] d(x))",
     ),
     "Reynolds": (
         "integral [0, 1] [b*x < a] d(x)",
@@ -35,9 +34,19 @@ TEXTBOOK = {
     ),
     "a bound between two": (
         "integral [0, 1] [b*x < a - 1/2] d(x)",
-        "(b*da - (a - 1/2)*db)/(b*abs(b))*[(a - 1/2)/b > 0 and (a - 1/2)/b < 1]",
+        "(b*da - (a - 1/2)*db)/(b*abs(b))*[0 < (a - 1/2)/b < 1]",
     ),
-    "factors in one order": ("integral [0, 1] [x < b*a] d(x)", "(b*da + a*db)*[a*b > 0 and a*b < 1]"),
+    "factors in one order": ("integral [0, 1] [x < b*a] d(x)", "(b*da + a*db)*[0 < a*b < 1]"),
+    "a bound on either side": ("integral [0, b] [x < a]*x d(x)", "b*db*[b < a] + a*da*([0 < a < b] - [b < a < 0])"),
+    "a threshold": ("integral [0, 1] [1/4 <= a*x^2] d(x)", "if [a > 1/4] then da/(4*a*sqrt(a)) else 0"),
+    "reach of an arm": (
+        "integral [0, pi] [b*cos(x/2) < a] d(x)",
+        "if [-1 <= a/b < 1 and 2*acos(a/b) < pi] then 2*(b*da - a*db)/(b*sqrt(b^2 - a^2)) else 0",
+    ),
+    "a mean": (
+        "integral [-inf, inf] x^2*exp(-(x - a)^2/2)/sqrt(2*pi) d(x)",
+        "da/sqrt(2*pi)*(integral [-inf, inf] x^2*(x - a)*exp(-(x - a)^2/2) d(x))",
+    ),
     "a coin": ("integral (k ~ bernoulli(a)) exp(b*k) d(k)", "exp(b)*(da + a*db) - da"),
 }
 
@@ -62,4 +71,4 @@ def test_small_numbers_are_written_as_people_do() -> None:
 
 def test_the_norm_of_an_array_has_no_number_that_cancels() -> None:
     shown = Shown("def f(x: [n] Real) sqrt(sum i in 0..n-1 (x[i]^2))\n", "f")
-    assert shown.text.tangent == "sum i in 0..len(x) - 1 (x[i]*dx[i])/sqrt(sum i in 0..len(x) - 1 (x[i]^2))"
+    assert shown.text.tangent == "(sum i in 0..len(x) - 1 (x[i]*dx[i]))/sqrt(sum i in 0..len(x) - 1 (x[i]^2))"

@@ -276,7 +276,7 @@ def test_deriv_of_a_delta_is_no_zero(potto: Potto) -> None:
     # the integral of delta(x - t)*x^2 is t^2 within [0, 1], so its derivative is 2*t
     answer = potto("deriv", "--json", "main.po", "f", main="def f(t) integral [0, 1] delta(x - t)*x^2 d(x)\n").json
     assert answer["integrals"][0]["boundary"] == ["integral [0, 1] -x^2*dt*delta'(x - t) d(x)"]
-    assert answer["derivative"] == "2*t*dt*[t > 0 and t < 1]"
+    assert answer["derivative"] == "2*t*dt*[0 < t < 1]"
 
 
 def test_deriv_of_a_definition_around_integrals_of_others(potto: Potto) -> None:

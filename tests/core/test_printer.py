@@ -146,7 +146,7 @@ def test_equations_end_with_their_number() -> None:
         (branch((add(x, y, c), sub(x, y)), False, ONE, ZERO), "[x + y + c >= 0]"),
         (branch((add(x, y, c), sub(x, y)), False, x, y), "if diffeo(x + y + c, x - y) then x else y"),
         (branch((sub(t, x),), True, x, y), "if [x < t] then x else y"),
-        (branch((x,), False, bracket(sub(t, x), True), ZERO), "[x >= 0 and x < t]"),
+        (branch((x,), False, bracket(sub(t, x), True), ZERO), "[0 <= x < t]"),
         (branch((x,), False, ONE, bracket(sub(t, x), True)), "[x >= 0 or x < t]"),
         (branch((x,), False, ZERO, bracket(sub(t, x), True)), "[x < 0 and x < t]"),
         (branch((x,), False, branch((y,), False, ONE, bracket(t)), ZERO), "[x >= 0 and (y >= 0 or t >= 0)]"),

@@ -75,6 +75,7 @@ from potto.core.terms import (
 from potto.primitives import EXPONENT, PRIMITIVES
 
 Dual = tuple[Term, Term]
+_REWRITTEN = 24  # times that an integral is rewritten before it is derived
 NO_TANGENTS: Mapping[str, Term] = {}
 
 
@@ -112,11 +113,8 @@ class Differentiator:
         self, resolve: Resolve, singular: bool = False, frozen: bool = False, wanted: Roots = Roots.STEADY,
         names: RootNames | None = None,
     ) -> None:  # fmt: skip
-        self.resolve = resolve
-        self.singular = singular
-        self.frozen = frozen
-        self.wanted = wanted
-        self.names = names
+        self.resolve, self.singular, self.frozen = resolve, singular, frozen
+        self.wanted, self.names = wanted, names
 
     def dual(self, term: Term, tangents: Mapping[str, Term]) -> Dual:
         functions = {n: t for n, t in tangents.items() if n in heads_of(term)}
@@ -144,9 +142,8 @@ class Differentiator:
 class _Pass:
     """The duals of all subterms under one set of tangents."""
 
-    def __init__(self, owner: Differentiator, tangents: Mapping[str, Term]) -> None:
-        self.owner = owner
-        self.tangents = tangents
+    def __init__(self, owner: Differentiator, tangents: Mapping[str, Term], rewritten: int = 0) -> None:
+        self.owner, self.tangents, self.rewritten = owner, tangents, rewritten
         self.found: dict[Term, Dual] = {}
         self.heads: frozenset[str] = frozenset()
 
@@ -368,12 +365,12 @@ class _Pass:
         apart = self.owner.wanted is not Roots.STEADY or not isinstance(whole, Integral)
         fewer = whole if apart else combined(whole)
         if not isinstance(whole, Integral) or fewer is not whole:  # deltas of a combination have one root
-            return _Pass(self.owner, self.tangents).run(fewer)
+            return self.again(fewer)
         plain = without_leftovers(without_deltas(whole, self.owner.wanted))
         if isinstance(plain, Integral) and not apart and not self.owner.frozen:
             plain = conditioned(plain)
         if not isinstance(plain, Integral):
-            return _Pass(self.owner, self.tangents).run(plain)
+            return self.again(plain)
         moving = {n: t for n, t in self.tangents.items() if n not in plain.variables}
         if not any(n in plain.free for n in moving):
             return plain, zero_like(plain.body)
@@ -395,3 +392,9 @@ class _Pass:
             name = None if self.owner.names is None else self.owner.names.along(moving)
             parts += [*at_bounds(plain, rate), *at_surfaces(plain, frozenset(moving), rate, self.owner.wanted, name)]
         return plain, total([p for p in parts if p is not ZERO], zero_like(plain.body))
+
+    def again(self, rewritten: Term) -> Dual:
+        """Of what an integral is rewritten to. A recursion in it that is as deep as a parameter says has no end."""
+        if self.rewritten > _REWRITTEN:
+            raise NotSmooth("a recursion in an integral is as deep as its arguments say")
+        return _Pass(self.owner, self.tangents, self.rewritten + 1).run(rewritten)

@@ -1,7 +1,7 @@
 """How conditions are written together: two bounds of one thing side by side, and squares as they are.
 
-Owns `bracket`, `between` and `is_shorter`. What two conditions hold between numbers stands between them:
-`-1 < c + x < 0` is c < -x and c + x + 1 > 0.
+Owns `bracket`, `between`, `with_squares` and `is_shorter`. What two conditions hold between numbers stands between
+them: `-1 < c + x < 0` is c < -x and c + x + 1 > 0.
 """
 
 from __future__ import annotations
@@ -14,13 +14,14 @@ from math import gcd, lcm
 from msgspec import Struct
 
 from potto.calculus.algebra.rational_form import as_term, normal
-from potto.calculus.explanation.brackets import Inequality, constant
+from potto.calculus.explanation.brackets import Inequality, constant, multiplied_out
 from potto.calculus.explanation.squares import root_of_square, squares_in
 from potto.core.polynomials import Polynomial, number
-from potto.core.printer import format_term
-from potto.core.terms import ONE, ZERO, Prim, Term, add, branch, const, mul, neg, pow_, sub
+from potto.core.printer import format_term, sides_of
+from potto.core.terms import ONE, ZERO, Prim, Term, Var, add, branch, const, mul, neg, postorder, pow_, sub
 
 _MONOMIALS = 6  # of what is written anew between its bounds
+_LONGER = 4  # characters that a square may cost
 _COEFFICIENT = 64  # the largest; multiples of decimal fractions are no plainer
 
 
@@ -67,9 +68,42 @@ def between(known: Sequence[Inequality]) -> list[Inequality]:
         for j in [j for j, b in alike if not b.turned] + [j for j, b in alike if b.turned]:
             surface = surfaces[j]
             plain = surface is not None and (len(alike) > 1 or is_shorter(surface, known[j].surface))
-            found.append(Inequality(surface, known[j].strict) if surface is not None and plain else known[j])
+            chosen = surface if surface is not None and plain else with_squares(known[j].surface)
+            found.append(Inequality(chosen, known[j].strict))
             done.add(j)
-    return found
+    return _in_rows(found) if len(found) > 1 else found
+
+
+def _in_rows(known: Sequence[Inequality]) -> list[Inequality]:
+    """The same in their order, but that a condition whose higher side is the lower one of another stands before that:
+    t < x < 0 for x < 0 and t < x."""
+    sides = [sides_of(item.surface) for item in known]
+    rows: list[list[int]] = []
+    for i, (low, high) in enumerate(sides):
+        before = next((row for row in rows if sides[row[0]][0] == high), None)
+        after = next((row for row in rows if sides[row[-1]][1] == low), None)
+        if after is not None:
+            after.append(i)
+        elif before is not None:
+            before.insert(0, i)
+        else:
+            rows.append([i])
+    return [known[i] for row in rows for i in row]
+
+
+def with_squares(surface: Term) -> Term:
+    """c - x^2 - t*x for c - x*(x + t): a square is read as one."""
+    products = [part for part in postorder(surface) if isinstance(part, Prim) and part.op == "mul"]
+    if not any(_hides_square(part.args) for part in products):
+        return surface
+    flat = multiplied_out(surface)
+    return flat if len(format_term(flat)) <= len(format_term(surface)) + _LONGER else surface
+
+
+def _hides_square(factors: Sequence[Term]) -> bool:
+    names = [arg for arg in factors if isinstance(arg, Var)]
+    sums = [arg for arg in factors if isinstance(arg, Prim) and arg.op == "add"]
+    return any(name in part.args or neg(name) in part.args for name in names for part in sums)
 
 
 def is_shorter(surface: Term, other: Term) -> bool:

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from fractions import Fraction
 from functools import lru_cache
+from itertools import combinations
 from math import isqrt
 
 from msgspec import Struct
@@ -72,6 +73,16 @@ def _turned(surface: Term) -> Term:
 def fewer(known: Iterable[Inequality], box: Box = _ANYWHERE) -> list[Inequality]:
     """The same conditions without what is said twice or follows from another one; of two that exclude each other none
     is left but that which never holds. box: the ranges of variables."""
+    items = tuple(known)
+    return list(_fewer_anywhere(items) if not box else _fewer(items, box)) if items else []
+
+
+@lru_cache(maxsize=1 << 12)
+def _fewer_anywhere(known: tuple[Inequality, ...]) -> list[Inequality]:
+    return _fewer(known, _ANYWHERE)
+
+
+def _fewer(known: Iterable[Inequality], box: Box) -> list[Inequality]:
     found: list[Inequality] = []
     for item in known:
         for plain in _plain(item, box):
@@ -80,7 +91,38 @@ def fewer(known: Iterable[Inequality], box: Box = _ANYWHERE) -> list[Inequality]
             if not any(implies(other, plain) for other in found):
                 found = [other for other in found if not implies(plain, other)]
                 found.append(plain)
-    return found
+    if len(found) < 2:
+        return found
+    whole = [_beside(item, found) for item in found]
+    return _not_added_up(found) if whole == found else _fewer(whole, box)
+
+
+def _beside(item: Inequality, known: Sequence[Inequality]) -> Inequality:
+    """Without factors and divisors that other conditions say are above 0: a > 0.64 for 0.64/a < 1 where a > 0."""
+    form = normal(item.surface)
+    if form is None or len(form.below) != 1 or (form.whole and len(form.top) > 1):
+        return item
+    above = {other.surface for other in known if other.strict and other is not item}
+    if not above:
+        return item
+    ((below, scale),) = form.below.items()
+    if not all(n % 2 == 0 or atom in above for atom, n in below):
+        return item
+    shared = {atom: n for atom, n in shared_by(list(form.top)).items() if atom in above}
+    if form.whole and not shared:
+        return item
+    top = as_term({without(m, shared): Fraction(c) / Fraction(scale) for m, c in form.top.items()})
+    return item if top is None else Inequality(top, item.strict)
+
+
+def _not_added_up(known: list[Inequality]) -> list[Inequality]:
+    """Without those that say no more than two others do: 0 < v where 0 < t < v."""
+    for item in known if len(known) > 2 else ():
+        others = [other for other in known if other is not item and other.strict]
+        for first, second in combinations(others, 2):
+            if implies(Inequality(add(first.surface, second.surface), True), item):
+                return _not_added_up([other for other in known if other is not item])
+    return known
 
 
 def plainer(surface: Term, box: Box) -> Term | None:
@@ -149,6 +191,8 @@ def two_sides(term: Term) -> Term | None:
 
 def _plain(item: Inequality, box: Box) -> list[Inequality]:
     """A condition as conditions without roots, and without factors whose sign is known; none if it always holds."""
+    if range_of(item.surface, box).positive:
+        return []
     found = normal(item.surface)
     if found is None:
         return [item]

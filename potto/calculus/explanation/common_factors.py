@@ -6,11 +6,12 @@ Owns `taken_out` and `collected`.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from fractions import Fraction
 from functools import reduce
 
 from potto.calculus.explanation.factors import Factors
 from potto.calculus.explanation.products import added, is_tangent, written
-from potto.core.terms import Const, Prim, Term, add
+from potto.core.terms import Const, Prim, Term, add, neg
 
 Factored = Callable[[Term], Factors]
 Simpler = Callable[[Term], Term]
@@ -20,7 +21,7 @@ def taken_out(
     summands: Sequence[Term], factored: Factored, simpler: Simpler, tangents: frozenset[str]
 ) -> Factors | None:
     """A sum as a product; None where its summands share nothing but numbers."""
-    parts = list(map(factored, summands))
+    parts = _turned_alike(list(map(factored, summands)))
     shared = reduce(Factors.shared_with, parts)
     if any(_is_below_differently(base, parts) for part in parts for base in part.powers):
         return None  # one fraction is plainer
@@ -34,6 +35,27 @@ def taken_out(
     rest = factored(simpler(add(*(written(part.without(shared), tangents) for part in parts))))
     shared.times_all(rest)
     return shared
+
+
+def _turned_alike(parts: list[Factors]) -> list[Factors]:
+    """The same products, of two sums that differ by their sign the first one in all of them."""
+    known: dict[frozenset[Term], Term] = {}
+    found: list[Factors] = []
+    for part in parts:
+        turned = part
+        for base, n in part.powers.items():
+            if not isinstance(base, Prim) or base.op != "add" or n.denominator != 1:
+                continue
+            known.setdefault(frozenset(base.args), base)
+            other = known.get(frozenset(map(neg, base.args)))
+            if other is not None and other is not base:
+                turned = Factors(
+                    turned.coefficient * Fraction(-1) ** int(n), dict(turned.powers), part.exponents, part.conditions
+                )
+                turned.times(base, -n)
+                turned.times(other, n)
+        found.append(turned)
+    return found
 
 
 def _is_below_differently(base: Term, parts: Sequence[Factors]) -> bool:

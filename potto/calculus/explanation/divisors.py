@@ -7,13 +7,14 @@ value, though the integral over [a x^2 + b x + c < 0] has a derivative there.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from itertools import combinations
 
 from potto.calculus.algebra.ranges import range_of
 from potto.calculus.explanation.brackets import Inequality, conditions, implies
 from potto.calculus.explanation.factors import factored
 from potto.calculus.explanation.symbols import Formula, Words
 from potto.core.simplify import normalized_surface
-from potto.core.terms import Branch, Const, If, Prim, Proj, Term, Var, children, neg, postorder, prim, sub
+from potto.core.terms import Branch, Const, If, Prim, Proj, Term, Var, add, children, neg, postorder, prim, sub
 from potto.primitives import PRIMITIVES
 
 Known = tuple[Inequality, ...]
@@ -38,14 +39,23 @@ def _divisors(formula: Term, names: frozenset[str], original: Iterable[Term], kn
     for term, held in _divided(formula, known):
         for base, n in factored(term).powers.items():
             whole = n > 0 and n.denominator == 1  # where a root is 0 that it divides by, there is no derivative either
-            inner = base.args[0] if isinstance(base, Prim) and base.op == "abs" else base
+            inner = _zero_of(base)
             apart = whole and inner.free and inner.free <= names and _is_plain(inner) and range_of(inner).zero
-            if apart and not any(_keeps_apart(item, inner) for item in held):
+            if apart and not _keep_apart(held, inner):
                 found.setdefault(normalized_surface(inner)[0], inner)
     if not found:
         return ()
     singular = {normalized_surface(base)[0] for term in original for base in _singular(term)}
     return tuple([base for canonical, base in found.items() if canonical not in singular])
+
+
+def _zero_of(base: Term) -> Term:
+    """What is 0 where a size, or a power with a fraction for its exponent, is."""
+    match base:
+        case Prim(op="abs", args=(inner,)) | Prim(op="pow", args=(inner, Const())):
+            return inner
+        case _:
+            return base
 
 
 def _is_plain(term: Term) -> bool:
@@ -76,6 +86,13 @@ def _divided(term: Term, known: Known) -> Iterator[tuple[Term, Known]]:
             waiting += [(node.then, inside), (node.orelse, outside), (node.surface, (*held, *others))]
         else:
             waiting += [(part, held) for part in children(node)]
+
+
+def _keep_apart(held: Known, base: Term) -> bool:
+    """Whether conditions hold nowhere where a term is 0, one by itself or two together: 0 < t < v."""
+    strict = dict.fromkeys(item.surface for item in held if item.strict)
+    both = [Inequality(add(first, second), True) for first, second in combinations(strict, 2)]
+    return any(_keeps_apart(item, base) for item in (*held, *both))
 
 
 def _keeps_apart(item: Inequality, base: Term) -> bool:

@@ -63,6 +63,8 @@ from potto.elaborate import core_term
 from potto.query import Database, query
 from potto.types import Type, derivative_type, format_type, groups_of, interface
 
+_MOST = 20_000  # characters of what stands under one integral, which nobody reads; what comes then is not looked for
+
 
 @query
 def explain_derivative(db: Database, file: str, name: str) -> DerivativeText:
@@ -243,16 +245,22 @@ def _integral(
     box = {**ranges, **box_of(node)}
     deltas, meeting, bounds, boundary = list[str](), list[str](), list[str](), tuple[str, ...]()
     interior, reason = "", ""
+
+    def under(term: Term) -> str:
+        if sum(map(len, (interior, *deltas))) > _MOST:
+            raise NoFormula("the formula is too long to be shown")
+        return words.under_integral(term, *names, box=box)
+
     try:
-        interior = words.under_integral(rate(node.body), *names, box=box)
+        interior = under(rate(node.body))
         for item in jumps(opened(node.body), node.variables, rate):
             if _outside(item.surface, box):
                 continue
             if continuous(item, node.variables):
                 meeting.append(words.equation(item.surface, node.variables))
             else:
-                deltas.append(words.under_integral(item.contribution, *names, box=box))
-        deltas += [words.under_integral(t, *names, box=box) for t in moving_deltas(node, rate)]
+                deltas.append(under(item.contribution))
+        deltas += [under(t) for t in moving_deltas(node, rate)]
         plain = _without_deltas(node)
         reason = "" if plain is None else _why_searched(plain)
         if plain is not None and level_set(plain) is None:

@@ -7,31 +7,50 @@ from __future__ import annotations
 
 from fractions import Fraction
 
+from potto.calculus.algebra.ranges import range_of
 from potto.calculus.explanation.factors import Factors
 from potto.calculus.explanation.products import is_tangent, written
-from potto.core.terms import Const, Integral, Prim, Sum, Term, Var, postorder, with_integrand, with_summand
+from potto.core.polynomials import Exact
+from potto.core.terms import Branch, Const, If, Integral, Prim, Sum, Term, Var, postorder, with_integrand, with_summand
 
 _EVERYWHERE = ("add", "mul", "neg", "sin", "cos", "atan", "tanh")  # no exp, which can be inf
 
 
 def in_front(node: Integral | Sum, factors: Factors, tangents: frozenset[str]) -> Term:
-    """An integral or a sum with the number, the tangents and what has a value everywhere of the `factors` of its body
-    before it: what has none somewhere stays, since brackets guard it there."""
+    """An integral or a sum with what does not vary in the `factors` of its body before it: numbers, tangents and what
+    has a value everywhere; where no bracket is beside them, the others too. Else brackets guard them where they are."""
     names = node.variables if isinstance(node, Integral) else (node.variable,)
     if isinstance(node, Sum) and hides_index(node):
         return node
     still = {base: n for base, n in factors.powers.items() if base.free.isdisjoint(names)}
-    fixed = {
-        base: n
-        for base, n in still.items()
-        if n > 0 and n.denominator == 1 and (_has_values(base) or is_tangent(base, tangents))
-    }
-    if not fixed and factors.coefficient == 1:
+    if not _is_bare(node, factors):
+        still = {base: n for base, n in still.items() if not base.free or _is_safe(base, n, tangents)}
+    rest = {base: n for base, n in factors.powers.items() if base not in still}
+    if not still and factors.coefficient == 1:
         return node
-    rest = {base: n for base, n in factors.powers.items() if base not in fixed}
+    return _apart(node, factors, still, rest, tangents)
+
+
+def _apart(
+    node: Integral | Sum, factors: Factors, still: dict[Term, Exact], rest: dict[Term, Exact], tangents: frozenset[str]
+) -> Term:
     inner = written(Factors(Fraction(1), rest, factors.exponents, factors.conditions), tangents)
     whole = with_integrand(node, inner) if isinstance(node, Integral) else with_summand(node, inner)
-    return written(Factors(factors.coefficient, {whole: 1, **fixed}, [], []), tangents)
+    return written(Factors(factors.coefficient, {whole: 1, **still}, [], []), tangents)
+
+
+def _is_safe(base: Term, n: Exact, tangents: frozenset[str]) -> bool:
+    if n.denominator > 1 or (n < 0 and not range_of(base).positive):
+        return False
+    return _has_values(base) or is_tangent(base, tangents)
+
+
+def _is_bare(node: Integral | Sum, factors: Factors) -> bool:
+    """Whether nothing is left out: no bracket, and a range that is never empty."""
+    if factors.conditions or any(isinstance(part, Branch | If) for base in factors.powers for part in postorder(base)):
+        return False
+    ends = node.bounds if isinstance(node, Integral) else ((node.lo, node.hi),)
+    return all(range_of(hi).lo >= range_of(lo).hi for lo, hi in ends)
 
 
 def hides_index(node: Sum) -> bool:

@@ -22,6 +22,7 @@ from potto.calculus.explanation.brackets import (
     two_sides,
 )
 from potto.calculus.explanation.factors import Factors, as_number, factored, is_parity, shortest
+from potto.calculus.explanation.fraction_roots import without_fractions
 from potto.core.polynomials import Exact, number
 from potto.core.printer import format_term
 from potto.core.terms import (
@@ -32,6 +33,7 @@ from potto.core.terms import (
     Branch,
     Const,
     Delta,
+    If,
     Index,
     Integral,
     Prim,
@@ -50,13 +52,14 @@ from potto.core.terms import (
 )
 
 _HALF = Fraction(1, 2)
-_PLAIN, _TANGENT, _SUM, _INTEGRAL, _DELTA = range(5)
+_PLAIN, _TANGENT, _SUM, _INTEGRAL, _EITHER, _DELTA = range(6)
 _FEW = 6  # digits of a number that a person has written
 _LARGEST_DIVISOR = 1000
 
 
 def _tidied(known: Factors) -> Factors:
     found = Factors(known.coefficient, dict(known.powers), known.exponents, fewer(known.conditions))
+    without_fractions(found)
     for base, exponent in list(found.powers.items()):
         if exponent.denominator == 1 and (decided := _where(found.conditions, base)) is not None:
             found.times(base, -exponent)
@@ -195,13 +198,13 @@ def written(found: Factors, tangents: frozenset[str]) -> Term:
     scale, divisor = _scale(abs(found.coefficient), bool(below))
     exponent = [prim("exp", add(*found.exponents))] if found.exponents else []
     plain = [b for b in top if place[b][0] == _PLAIN]
-    names = [b for b in plain if place[b][1][0] == 0 and found.powers[b].denominator == 1]
-    above = [*_powers(found, names, 1), *exponent, *_powers(found, [b for b in plain if b not in names], 1)]
-    tail = [_raised(b, found.powers[b]) for b in top if place[b][0] != _PLAIN]
-    held = [bracket(found.conditions)] if found.conditions else []
-    deltas = [b for b in tail if _place(b, tangents) == _DELTA]
-    integrals = [_raised(b, found.powers[b]) for b in top if place[b][0] == _INTEGRAL]
-    moving = [b for b in tail if b not in (*deltas, *integrals)]
+    led = [b for b in plain if place[b][1][0] <= 1 and found.powers[b].denominator == 1]
+    above = [*_powers(found, led, 1), *exponent, *_powers(found, [b for b in plain if b not in led], 1)]
+    moving, integrals, either, deltas = (
+        [_raised(b, found.powers[b]) for b in top if place[b][0] in places]
+        for places in ((_TANGENT, _SUM), (_INTEGRAL,), (_EITHER,), (_DELTA,))
+    )
+    held = [*either, *([bracket(found.conditions)] if found.conditions else [])]
     under = [divisor, *_powers(found, below, -1)]
     halved = [] if above or moving else integrals  # half of an integral, but dt/2 times one
     fraction = div(mul(scale, *above, *moving, *halved), mul(*under))
@@ -290,6 +293,8 @@ def _place(base: Term, tangents: frozenset[str]) -> int:
         return _SUM
     if isinstance(base, Integral) or _is_of_brackets(base):
         return _INTEGRAL
+    if isinstance(base, Branch) and ONE in (base.then, base.orelse) and format_term(base).startswith("["):
+        return _EITHER
     moves = is_tangent(base, tangents) or (isinstance(base, Prim) and base.op == "add" and base.free & tangents)
     return _TANGENT if moves else _PLAIN
 
@@ -302,10 +307,10 @@ def _is_of_brackets(base: Term) -> bool:
 
 
 def _order(base: Term) -> tuple[int, str]:
-    """Names first, in the order of the alphabet, pi before others, then calls, then sums."""
+    """Names first, in the order of the alphabet, pi before others, then sums, then calls, choices last."""
     if isinstance(base, Var | Const):
-        return 0, "" if base is PI else format_term(base)
-    return (2 if isinstance(base, Prim) and base.op == "add" else 1), ""
+        return 0, "" if base is PI else str(base.name) if base.name is not None else format_term(base)
+    return 1 if isinstance(base, Prim) and base.op == "add" else 3 if isinstance(base, If | Branch) else 2, ""
 
 
 def is_tangent(base: Term, tangents: frozenset[str]) -> bool:

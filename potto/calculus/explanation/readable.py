@@ -19,7 +19,7 @@ from potto.calculus.algebra.rational_form import Rational, normal
 from potto.calculus.explanation.alike import alike, content
 from potto.calculus.explanation.alternatives import in_one, sums_of_choices
 from potto.calculus.explanation.angles import at_angle, length
-from potto.calculus.explanation.bounds import between
+from potto.calculus.explanation.bounds import between, with_squares
 from potto.calculus.explanation.bounds import bracket as bracket_of
 from potto.calculus.explanation.brackets import Inequality, conditions, fewer
 from potto.calculus.explanation.common_factors import collected, taken_out
@@ -28,6 +28,7 @@ from potto.calculus.explanation.decimals import over_whole_numbers, root_of_numb
 from potto.calculus.explanation.factors import Factors, factored
 from potto.calculus.explanation.in_front import hides_index, in_front
 from potto.calculus.explanation.named_sums import put_back, with_sums_named
+from potto.calculus.explanation.oriented import either_way
 from potto.calculus.explanation.products import added, in_order, is_negative, led_by, with_one_root, written
 from potto.calculus.explanation.signs import of_two, sign_of_product, size_of_product, sums_of_signs
 from potto.calculus.explanation.squares import root_of_square, squares_in
@@ -42,6 +43,7 @@ from potto.core.terms import (
     Array,
     Branch,
     Const,
+    Delta,
     Fold,
     If,
     Integral,
@@ -53,6 +55,7 @@ from potto.core.terms import (
     branch,
     children,
     const,
+    delta,
     div,
     if_,
     integral,
@@ -70,6 +73,7 @@ _ARITHMETIC = ("add", "neg", "mul", "div", "pow", "sqrt", "exp")
 _LONG = 100_000  # characters of a formula of which nobody will read what can be made, beyond which nothing is tried
 _MANY = 60  # nodes of what is expanded
 _SUMMANDS = 24
+_SIGNS_OF_A_SUM = 12  # characters that say no more than over what is summed
 _TANGENT = 4  # how much longer a formula seems for each tangent that it names
 
 
@@ -130,6 +134,8 @@ class _Work:
                     self.progress.pause()
                     self.progress.known[key] = self._shortest(node)
                 return self.progress.known[key]
+            case Delta(coordinates=(surface,)):
+                return delta((with_squares(surface),))
             case Branch():
                 if (whole := self._by_choice(node)) is not None:
                     return whole
@@ -140,9 +146,7 @@ class _Work:
                     return in_one(node, self.tangents, self.inside, self._cost)
                 if ZERO in (node.then, node.orelse) and not isinstance(node.then, Tuple):
                     return self._by_bracket(node)
-                (item,) = between([Inequality(node.surface, node.strict)])
-                whole = branch((item.surface,), item.strict, node.then, node.orelse)
-                return in_one(whole, self.tangents, self.inside, self._cost) if isinstance(whole, Branch) else whole
+                return self._choice(node)
             case Prim(op="sign"):
                 return sign_of_product(node)
             case Prim(op="abs"):
@@ -162,6 +166,14 @@ class _Work:
                 return in_front(few, self._factored(few.body), self.tangents) if isinstance(few, Integral) else few
             case _:
                 return node
+
+    def _choice(self, node: Branch) -> Term:
+        """Between two formulas, in the shortest way."""
+        (item,) = between([Inequality(node.surface, node.strict)])
+        whole = branch((item.surface,), item.strict, node.then, node.orelse)
+        whole = in_one(whole, self.tangents, self.inside, self._cost) if isinstance(whole, Branch) else whole
+        both = either_way(node)
+        return whole if both is None else min(whole, self.node(both), key=self._cost)
 
     def _by_bracket(self, node: Branch) -> Term:
         """What is 0 on one side as a product."""
@@ -187,14 +199,14 @@ class _Work:
         return self.node(branch(choice.coordinates, choice.strict, then, orelse))
 
     def _of_few(self, node: Sum) -> Term | None:
-        """A sum of two, one by one, if that is shorter: x and 1 - x for the values at 0 and 1."""
+        """A sum of two, one by one, if that is as short: x and 1 - x for the values at 0 and 1."""
         match node:
             case Sum(lo=Const(value=lo), hi=Const(value=hi)) if hi == lo + 1 and not hides_index(node):
                 if any(isinstance(part, Integral) for part in postorder(node.body)):
                     return None
                 both = add(*(substitute(node.body, {node.variable: end}) for end in (node.lo, node.hi)))
                 whole = transform(both, lambda _, new: self.node(new))
-                return whole if self._cost(whole) < self._cost(node) else None
+                return whole if self._cost(whole) < self._cost(node) + _SIGNS_OF_A_SUM else None
             case _:
                 return None
 
@@ -224,7 +236,7 @@ class _Work:
                 forms = [written(factored(node), self.tangents), *self._of_squares(node)]
             case _:
                 forms = [self._with_sums_as_products(node), written(factored(node), self.tangents)]
-        if sum(1 for _ in postorder(node)) <= _MANY:
+        if _is_small(node):
             whole, sums = with_sums_named(node, self.tangents)
             for form, named in ((node, []), (whole, sums)) if sums else ((node, sums),):
                 found = normal(form)
@@ -361,6 +373,17 @@ class _Work:
 
     def _plain_sum(self, form: Polynomial) -> Term:
         return added([self._product(Fraction(c), (m, 1)) for m, c in form.items()])
+
+
+def _is_small(term: Term) -> bool:
+    """Whether a term has few parts, without counting more of them."""
+    seen, waiting = set[Term](), [term]
+    while waiting and len(seen) <= _MANY:
+        node = waiting.pop()
+        if node not in seen:
+            seen.add(node)
+            waiting += children(node)
+    return len(seen) <= _MANY
 
 
 def _is_endless(bound: Term) -> bool:

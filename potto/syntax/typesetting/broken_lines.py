@@ -11,6 +11,7 @@ from itertools import pairwise
 _SIGNS = (" + ", " - ", " − ")
 _SIDES = (" then ", " else ")
 _JOINTS = (" and ", " or ", " ∧ ", " ∨ ")
+_ORDERS = (" < ", " <= ", " ≤ ")
 _LET, _IN, _WHERE = "let ", " in ", " where "
 _FACTORS = ("·", "*")
 _OUTSIDE = -1
@@ -58,6 +59,7 @@ def _places(text: str) -> list[int]:
     choices: dict[int, list[int]] = {}
     sums: dict[int, list[int]] = {}
     joints: dict[int, list[int]] = {}
+    orders: dict[int, list[int]] = {}
     factors: dict[int, list[int]] = {}
     ends: dict[int, int] = {}
     around = [_OUTSIDE]
@@ -70,12 +72,15 @@ def _places(text: str) -> list[int]:
             ends[around.pop()] = i
         elif i and text.startswith(_JOINTS, i) and around[-1] != _OUTSIDE:
             joints.setdefault(around[-1], []).append(i)
+        elif i and text.startswith(_ORDERS, i):
+            orders.setdefault(around[-1], []).append(i)
         elif i and text.startswith(_SIDES, i):
             choices.setdefault(around[-1], []).append(i)
         elif i and text.startswith(_SIGNS, i):
             sums.setdefault(around[-1], []).append(i)
         elif i and char in _FACTORS:
             factors.setdefault(len(around), []).append(i)
+    sums |= {at: places for at, places in orders.items() if len(places) > 1}  # what stands between two bounds
     sums |= joints  # conditions are told apart before their sides are
     sums |= choices  # a choice reaches further than a sum
     if _OUTSIDE in sums:
