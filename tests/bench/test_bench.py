@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from potto.__main__ import main
-from potto.bench.measure import Run, measure, slope
+from potto.bench.measure import BenchRun, measure, slope
 from potto.bench.ours import OURS
 from potto.bench.peers import BATCH, PEERS, SCALAR, cells
 from potto.bench.problems import QUANTITIES, catalogue
@@ -36,7 +36,7 @@ def runs_of(problem, name, quantity, rungs=3):
     if name.startswith("JAX"):  # starts threads, which forks of other tests in this process do not like
         words = ["bench", problem.id, "--methods", name, "--quantity", quantity, "--quick", "--json"]
         said = subprocess.run([sys.executable, "-m", "potto", *words], capture_output=True, text=True, check=True)
-        return [Run(**run) for run in json.loads(said.stdout)["runs"]][:rungs]
+        return [BenchRun(**run) for run in json.loads(said.stdout)["runs"]][:rungs]
     return list(measure([problem], [peer(name)], [quantity], 0.5, rungs))
 
 
@@ -100,7 +100,7 @@ def test_monte_carlo_converges_like_the_root_and_quasi_monte_carlo_like_the_numb
 def run_of(setting, seconds, error, **more):
     fields = {"problem": "step", "quantity": "value", "method": "m", "dial": "rtol", "setting": setting,
               "seconds": seconds, "evaluations": 10, "value": 1.0, "error": error, "reported": None}  # fmt: skip
-    return Run(**{**fields, **more})
+    return BenchRun(**{**fields, **more})
 
 
 def test_one_lucky_rung_does_not_count():
