@@ -11,7 +11,7 @@ import math
 import sys
 from collections.abc import Iterable
 from functools import lru_cache
-from mmap import mmap
+from mmap import ACCESS_COPY, mmap
 from threading import Lock
 from typing import Any
 
@@ -77,12 +77,19 @@ def _free(size: int) -> NDArray[np.uint8]:
         if _blocks[place].size == size and _holders(_blocks, place) == NOBODY:
             _blocks.append(_blocks.pop(place))
             return _blocks[-1]
-    block = np.frombuffer(mmap(-1, size), dtype=np.uint8)  # numpy asks for huge pages, which may take 40 ms to find
+    block = np.frombuffer(_pages(size), dtype=np.uint8)  # numpy asks for huge pages, which may take 40 ms to find
     if size <= MOST:
         _blocks.append(block)
     while sum(own.size for own in _blocks) > MOST:
         del _blocks[0]  # whoever has arrays over it keeps it
     return block
+
+
+def _pages(size: int) -> mmap:
+    """Memory of this process alone: by itself `mmap` shares it with those that are forked off."""
+    if sys.platform == "win32":
+        return mmap(-1, size)
+    return mmap(-1, size, access=ACCESS_COPY)
 
 
 def _holders(blocks: list[NDArray[np.uint8]], place: int) -> int:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+
 import numpy as np
 import pytest
 
@@ -31,6 +33,20 @@ def test_no_more_memory_is_kept_than_some() -> None:
     before = list(map(id, memory._blocks))
     room(2 * MOST // 8)
     assert list(map(id, memory._blocks)) == before
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="processes are not copies of one another here")
+@pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning")
+def test_memory_is_not_shared_with_processes_that_are_forked_off() -> None:
+    """Pixels of one process were those of another: blocks were mapped to be shared."""
+    mine = room(LARGE)
+    mine[:] = 1.0
+    child = os.fork()
+    if not child:
+        mine[:] = 2.0
+        os._exit(0)
+    os.waitpid(child, 0)
+    assert (mine == 1.0).all()
 
 
 @pytest.mark.parametrize("body", ["x", "integral [0, 1] x*s d(s)", "integral [0, 1] [s < x] d(s)"])
