@@ -12,6 +12,7 @@ holds a single root.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 
@@ -27,8 +28,13 @@ ASIDE = 4  # boxes: from how far off on the middle of a conic is none of what is
 MOST_PAIRS = 1 << 13  # that are looked at at once
 STEPS = 8  # of Newton's method; what it takes longer for is not proved
 PROVED = 2.0**-4  # at most, of Kantorovich's h, so that any two places either are one or are told apart
-# Rotations of projective space, in which no direction of a conic is special but by chance: so there is another one.
-TURNS = tuple(np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))[0] for seed in range(2))
+
+
+@lru_cache(maxsize=1)
+def _turns() -> tuple[Array, ...]:
+    """Rotations of projective space, in which no direction of a conic is special but by chance: so there is another
+    one. They are made where they are asked for: numpy loads what draws numbers with the first."""
+    return tuple(np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))[0] for seed in range(2))
 
 
 class Crossings(Columns):
@@ -165,9 +171,10 @@ def _form(m: Ball, p: Sequence[Ball], q: Sequence[Ball]) -> Ball:
 def _of_conics(p: Ball, q: Ball, box: Array) -> Crossings:
     """Crossings of two conics with matrices p and q each."""
     left, parts = np.arange(box.shape[1]), list[Crossings]()
-    for turn in TURNS:
+    turns = _turns()
+    for turn in turns:
         search = _Search(*(_in_frame(of[:, :, left], turn[:, :, None]) for of in (p, q)))
-        last = turn is TURNS[-1]
+        last = turn is turns[-1]
         done = ~search.open.any(axis=0) | last
         which, at = np.nonzero(search.proved & done)
         u, v = (Ball(of[which, at], search.radius[which, at]) for of in search.places)
