@@ -23,7 +23,7 @@ FLOORS: tuple[tuple[str, ...], ...] = (
     ("potto.modules", "potto.diffeos", "potto.measures"),
     ("potto.syntax", "potto.core", "potto.primitives"),
     ("potto.reports", "potto.projects", "potto.data"),
-    ("potto.source", "potto.quick", "potto.diagnostics", "potto.query", "potto.store", "potto.extras", "potto.digests"),
+    ("potto.source", "potto.diagnostics", "potto.query", "potto.store", "potto.extras", "potto.digests"),
 )
 # What a package must not import although its floor would let it.
 FORBIDDEN: dict[str, tuple[str, ...]] = {

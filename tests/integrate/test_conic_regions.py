@@ -9,6 +9,7 @@ import mpmath as mp
 import numpy as np
 import pytest
 from conic_areas import Conic, Inside, area, places
+from how_many import examples
 
 import potto
 from potto.integrate.decomposition.balls import exact
@@ -60,7 +61,10 @@ def tree(pick: random.Random, leaves: list[int], conics: list[Conic]) -> tuple[s
     return f"(({text}) or ({rest}))", lambda held: one(held) or other(held)
 
 
-@pytest.mark.parametrize("seed", [pytest.param(k, marks=[] if k < 8 else pytest.mark.slow) for k in range(70)])
+TREES = [pytest.param(k, marks=[] if k < 8 else pytest.mark.slow) for k in range(examples(40, 400))]
+
+
+@pytest.mark.parametrize("seed", TREES)
 def test_trees_of_conics(seed: int) -> None:
     """Three to eight of all kinds, joined at random. 1e-14, 1e-13: what doubles are rounded by, of numbers up to 4 and
     of slopes up to 10."""
