@@ -63,7 +63,7 @@ def apart(parts: Iterable[Any]) -> bool:
     while left:
         part = left.pop()
         if isinstance(part, np.ndarray):
-            starts.append(part.ctypes.data)
+            starts.append(part.__array_interface__["data"][0])
         elif isinstance(part, tuple | list):
             left += part
     return len(set(starts)) == len(starts)

@@ -71,13 +71,11 @@ class Batch(Struct, frozen=True):
 
         own: its arrays are in nobody else's hands.
         """
-        if self.shape is None and all(
-            part is None or part.__class__ is float
-            for part in (estimate.value, estimate.error, estimate.tangent, estimate.tangent_error)
-        ):
-            return estimate
         parts = (estimate.value, estimate.error, estimate.tangent, estimate.tangent_error)
-        value, error, tangent, tangent_error = (self.restored(part, own and apart(parts)) for part in parts)
+        if self.shape is None and all(part is None or part.__class__ is float for part in parts):
+            return estimate
+        own = own and apart(parts)
+        value, error, tangent, tangent_error = (self.restored(part, own) for part in parts)
         shaped = replace(estimate, value=value, error=error, tangent=tangent, tangent_error=tangent_error)
         if self.shape is None:
             return replace(shaped, member_converged=None, shortfalls=dict.fromkeys(estimate.shortfalls, True))
