@@ -87,7 +87,7 @@ class Costs(Struct):
 
     @contextmanager
     def apart(self, share: float = 0.0) -> Iterator[None]:
-        """What is evaluated here is no interior: `share` of it is boundary, the rest checks."""
+        """What is evaluated here is not interior: `share` of it is boundary, the rest checks."""
         if self._apart is not None:  # within another one: that decides
             yield
             return

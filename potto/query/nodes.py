@@ -16,7 +16,7 @@ MISSING: Final[Any] = object()  # the value of an input that was never set
 
 
 class Cancelled(BaseException):
-    """The evaluation was cancelled. This is no `Exception`, so that handlers of errors let it through."""
+    """The evaluation was cancelled. Not an `Exception`, so that handlers of errors let it through."""
 
 
 class Strayed(BaseException):

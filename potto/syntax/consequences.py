@@ -70,7 +70,7 @@ class Told:
         )
 
     def _without_differential(self, stop: Stop) -> None:
-        """Where an integral breaks off, that its `d(...)` is missing too is no news."""
+        """Where an integral breaks off, that its `d(...)` is missing too is nothing new."""
         at, code = stop.at.start, kinds.NO_DIFFERENTIAL.code
         self.of_tokens = [
             d for d in self.of_tokens if d.code != code or all(related.span.start != at for related in d.related)

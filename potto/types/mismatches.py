@@ -154,7 +154,7 @@ def _is_table(type: TupleOf) -> bool:
 
 
 def rows_of(table: Type, wanted: Type, name: str) -> str | None:
-    """The rows of a table as an array of records; None where they are no such."""
+    """The rows of a table as an array of records; None where they are not one."""
     actual, expected = resolve(table), resolve(wanted)
     item = resolve(expected.item) if isinstance(expected, ArrayOf) else None
     if not isinstance(actual, TupleOf) or not isinstance(item, TupleOf) or not _is_table(actual):

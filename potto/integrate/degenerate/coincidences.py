@@ -105,7 +105,7 @@ def count_slivers(scene: IteratedVariable, cuts: Cuts, sums: Sums) -> None:
 
 
 def note_folds(scene: IteratedVariable, cuts: Cuts) -> None:
-    """Say where sections of a surface appear or merge just here. At single nodes further out that is no matter."""
+    """Say where sections of a surface appear or merge just here. At single nodes further out that does not matter."""
     levels, number = scene.parent.plan.levels, scene.number
     for fold in cuts.folds:
         counts = scene.counted(fold.owner)

@@ -29,7 +29,7 @@ def count_narrow(
 ) -> None:
     """Add to the errors what the integrand is on other sides of narrow stretches: doubtful says, by group, of which.
 
-    At single nodes of the variables further out that is no matter.
+    At single nodes of the variables further out that does not matter.
     """
     there = np.stack(list(doubtful.values()))
     index = np.nonzero(there.any(axis=0))[0]

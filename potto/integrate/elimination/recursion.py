@@ -214,7 +214,7 @@ def _table(
         """Without speeds values alone."""
         wide = machine.with_directions(len(speeds))
         here = {name: pad(value, wide.directions) if len(speeds) else still(value) for name, value in env.items()}
-        together = np.zeros(x.size, dtype=np.int64)  # what single nodes meet is no matter
+        together = np.zeros(x.size, dtype=np.int64)  # what single nodes meet does not matter
         apart = wide.apart()
         sums = iteration.run(1, {**here, state.variable: Cell(x, None, tuple(speeds))}, x.size, {}, apart, together)
         if not len(speeds):  # at the ends of pieces: derivatives are not asked for

@@ -172,7 +172,7 @@ def _scientific(count: int, place: int, scale: int) -> str:
 
 
 def not_finite(value: float) -> str:
-    """An infinity, or what is no number, as a program writes it."""
+    """An infinity, or what is not a number, as a program writes it."""
     return "nan" if math.isnan(value) else ("inf" if value > 0 else "-inf")
 
 

@@ -121,8 +121,8 @@ def asked_between(surface: StepSurface, there: bool) -> bool:
 
 
 def step_integral(term: Integral, body: Term) -> StepIntegral | None:
-    """The integral in this form. None where the places of a condition are no closed forms, or it counts in another way,
-    and where what is left is not analytic by its form.
+    """The integral in this form. None where the places of a condition have no closed forms, or it counts in another
+    way, and where what is left is not analytic by its form.
 
     body: the integrand with calls carried out.
     """
@@ -201,7 +201,7 @@ class _Reading:
         return None if number is None else (number, turned > 0)
 
     def _found(self, face: WrittenSurface) -> StepSurface | None:
-        """A surface with its rows; None where these are no closed forms."""
+        """A surface with its rows; None where these have no closed forms."""
         found = _solved(face, self.variable)
         return None if found is None else StepSurface(face.form, self._placed(found[0]), *found[1:])
 
