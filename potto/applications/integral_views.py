@@ -80,6 +80,7 @@ class IntegralView(Struct, frozen=True):
     bounds: tuple[Arrow, ...]
     held: tuple[tuple[str, float], ...] = ()
     cut: bool = False  # whether a range goes on beyond what is drawn
+    unseen: bool = False  # whether there are surfaces that are not drawn
     ghosts: tuple[tuple[Line, ...], tuple[Line, ...]] = ((), ())
     nodes: tuple[Point, ...] = ()
 
@@ -169,7 +170,7 @@ class Viewer:
         )
         view = IntegralView(
             self.seen, tuple(box), _rows(np.where(inside, values, np.nan)), _rows(cells), surfaces,
-            self._bounds(places, box), tuple(held), cut,
+            self._bounds(places, box), tuple(held), cut, self.region.unseen,
             self._ghosts(places, grids, wrt, ghost) if ghost else ((), ()),
             self._nodes(given, box) if nodes else (),
         )  # fmt: skip

@@ -13,6 +13,7 @@ from msgspec import Struct
 
 from potto.calculus.differentiation.boundary_terms import jumps
 from potto.calculus.differentiation.dual import Differentiator
+from potto.calculus.explanation.continuity import continuous
 from potto.calculus.explanation.notation import Notation
 from potto.calculus.explanation.plain_names import apart, plainly_named
 from potto.calculus.solving.pivots import Roots
@@ -86,6 +87,7 @@ class DrawnIntegral(Struct, frozen=True):
     whole: Lam
     interior: Lam
     surfaces: tuple[RegionSurface, ...]
+    unseen: bool  # whether there are others, of conditions in sums
 
 
 def regions(db: Database, term: Term, wrt: str, notation: Notation) -> tuple[DrawnIntegral, ...]:
@@ -184,11 +186,9 @@ def _region(
 
     deltas = dict.fromkeys(part.coordinates[0] for part in postorder(node.body) if isinstance(part, Delta))
     drawn = with_integrand(node, transform(node.body, lambda _, new: ZERO if isinstance(new, Delta) else new))
-    found = [
-        surface(item.surface, over(item.jump))
-        for item in jumps(drawn.body, node.variables, lambda term: ONE)
-        if not item.sums and not any(isinstance(inner, App) for inner in postorder(item.surface))
-    ]
+    met = list(jumps(drawn.body, node.variables, lambda term: ONE))
+    seen = [i for i in met if not i.sums and not any(isinstance(inner, App) for inner in postorder(i.surface))]
+    found = [surface(i.surface, over(ZERO if continuous(i, node.variables) else i.jump)) for i in seen]
     return DrawnIntegral(
         names,
         node.variables,
@@ -198,4 +198,5 @@ def _region(
         over(node, params),
         over(with_integrand(drawn, along(drawn.body, wrt)), params),
         (*found, *(surface(level, None) for level in deltas)),
+        len(seen) < len(met),
     )

@@ -52,11 +52,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
     if chosen is None:
         return 2
     path = options.output
-    if path is not None and (options.name is None or not path.endswith(".svg")):
-        wrong = (
-            f"{path} does not end with .svg" if options.name else "say whose integral: `potto view FILE NAME -o FILE`"
-        )
-        console.complain(f"potto view: {wrong}")
+    if path is not None and not path.endswith(".svg"):
+        console.complain(f"potto view: {path} does not end with .svg")
         return 2
     world = World(["."])
     try:
@@ -65,12 +62,12 @@ def run(options: argparse.Namespace, console: Console) -> int:
         else:
             file, options = called(world, options)
             each_once(options.given)
+        if options.name is None and (path is not None or options.json):
+            console.complain(f"potto view: say whose integral: `potto view FILE NAME`{_whose(world, file)}")
+            return 2
         if path is None and not options.json:
             with settings(**asdict(chosen)):
                 return _page(world, file, options, console)
-        if options.name is None:
-            console.complain("potto view: say whose integral: `potto view FILE NAME --json`")
-            return 2
         with settings(**asdict(chosen)):
             found = IntegralScene(world, file, options.name, dict(options.given))
             wrt = options.wrt or found.moving
@@ -86,6 +83,17 @@ def run(options: argparse.Namespace, console: Console) -> int:
         count = len(shot.view.surfaces)
         console.answer(f"{path}: {options.name} by {wrt}, {count} surface{'' if count == 1 else 's'}")
     return 0
+
+
+def _whose(world: World, file: str) -> str:
+    """The functions of a file with an integral to look at, as the end of a sentence."""
+    from potto.core.terms import Integral, postorder
+    from potto.elaborate import core
+    from potto.ide.display.scenes import scenes
+
+    terms = {found.name: core(world.db, file, found.name).term for found in scenes(world.db, file, drawable=False)}
+    seen = [name for name, term in terms.items() if any(isinstance(part, Integral) for part in postorder(term))]
+    return f", of {', '.join(seen)}" if seen else ""
 
 
 def _written(path: str, text: str, console: Console) -> bool:

@@ -27,3 +27,5 @@ def test_what_is_wrong_is_said(potto: Potto) -> None:
     assert "no parameter `q`" in potto("view", "main.po", "f", "q=1", "-o", "f.svg", main=PROGRAM).err
     assert potto("view", "main.po", "f", "-o", "f.gif", main=PROGRAM).status == 2
     assert potto("view", "main.po", "f", "-o", "none/f.svg", main=PROGRAM).status == 1
+    told = potto("view", "main.po", "-o", "f.svg", main=PROGRAM + "def g(t) t^2\n")
+    assert told.status == 2 and told.err.endswith("FILE NAME`, of f\n")

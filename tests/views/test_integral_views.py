@@ -11,7 +11,7 @@ import pytest
 from msgspec import Struct
 
 from potto.applications import integral_scenes
-from potto.applications.integral_pictures import told
+from potto.applications.integral_pictures import remarks, told
 from potto.applications.integral_scenes import IntegralScene
 from potto.applications.integral_views import IntegralNumbers, IntegralView
 from potto.diagnostics import PottoError
@@ -28,6 +28,8 @@ def shaded(c, shader) integral ([0, 1], [0, 1]) [x + y + c >= 0]*shader(x, y) d(
 def both(a, b) integral [0, 1] a*[x < b] d(x)
 def pair(k, p: (Real, Real)) integral [0, fst(p)] snd(p)*x d(x)
 def two(t) (integral [0, 1] [x < t] d(x)) + (integral [0, 1] [x < t^2] d(x))
+def kink(t) integral [0, 1] (if [exp(x) < t] then 2*(t - exp(x)) else exp(x) - t) d(x)
+def steps(t) integral [0, 1] (sum i in 1..9 ([x < t/i])) d(x)
 def part(c) integral [0, 1] (if [x < c] then (1, x) else (0, 2)) d(x)
 def second(c) part(c).1
 def on(c) integral [0, 1] delta(x - c)*x^2 d(x)
@@ -107,6 +109,17 @@ def test_an_endless_range_is_cut_and_says_so() -> None:
     shot = looked("tail", "m", m=0.2)
     assert shot.view.cut
     assert shot.view.surfaces[0].gain == pytest.approx(math.exp(-0.04), abs=1e-14)
+
+
+def test_where_nothing_jumps_there_is_no_arrow() -> None:
+    """Both sides meet at exp(x) = t but for rounding, which is no gain."""
+    (surface,) = looked("kink", "t", t=1.7).view.surfaces
+    assert surface.lines and surface.gain == 0 and not any(arrow.weight for arrow in surface.arrows)
+
+
+def test_surfaces_that_are_not_drawn_are_told() -> None:
+    view = looked("steps", "t", t=0.7).view
+    assert not view.surfaces and remarks(view) == ["surfaces of a sum's conditions are not drawn"]
 
 
 def test_of_three_variables_a_section_is_seen() -> None:
