@@ -221,7 +221,8 @@ def test_the_state_of_a_fold_has_the_fields_of_the_first_one() -> None:
 @pytest.mark.parametrize(
     ("program", "read"),
     [
-        ("sum i in 1..5 (integral [0, 1] [x*abs(i) < t/i] d(x))", "dt*(sum i in 1..5 (1/i^2*[0 < t < i^2]))"),
+        ("sum i in 1..3 (integral [0, i] [x < t] d(x))", "dt*(sum i in 1..3 ([0 < t < i]))"),
+    ("sum i in 1..5 (integral [0, 1] [x*abs(i) < t/i] d(x))", "dt*(sum i in 1..5 (1/i^2*[0 < t < i^2]))"),
         ("sum i in -5..-1 (integral [0, 1] [x*i < t] d(x))", "-dt*(sum i in -5..-1 (1/i*[i < t < 0]))"),
         ("sum i in -1..5 (integral [0, 1] [x*i < t] d(x))", "dt*(sum i in -1..5 (1/abs(i)*[i*t > 0 and t/i < 1]))"),
         ("sum i in 1..5 (sum j in i..9 (integral [0, 1] [j*x < t] d(x)))",

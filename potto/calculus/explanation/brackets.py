@@ -86,7 +86,7 @@ def _fewer(known: Iterable[Inequality], box: Box) -> list[Inequality]:
     found: list[Inequality] = []
     for item in known:
         for plain in _plain(item, box):
-            if any(_excludes(other, plain) for other in found):
+            if any(_excludes(other, plain, box) for other in found):
                 return [NEVER]
             if not any(implies(other, plain) for other in found):
                 found = [other for other in found if not implies(plain, other)]
@@ -317,12 +317,12 @@ def _without_even(item: Inequality, top: Polynomial, below: Polynomial, box: Box
     return [Inequality(whole if scale > 0 else neg(whole), item.strict)]
 
 
-def _excludes(first: Inequality, second: Inequality) -> bool:
-    """Whether two conditions never hold together: their surfaces add up to a number that is not above 0."""
-    total = constant(add(first.surface, second.surface))
-    if total is None:
-        return False
-    return total < 0 or (total == 0 and (first.strict or second.strict))
+def _excludes(first: Inequality, second: Inequality, box: Box) -> bool:
+    """Whether two conditions never hold together: their surfaces add up to what is nowhere above 0 in the box."""
+    both = add(first.surface, second.surface)
+    total = constant(both)
+    most = total if total is not None else range_of(multiplied_out(both), box).hi if box else 1.0
+    return most < 0 or (most == 0 and (first.strict or second.strict))
 
 
 @lru_cache(maxsize=1 << 12)
