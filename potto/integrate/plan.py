@@ -47,7 +47,9 @@ from potto.core.terms import (
     var,
     with_integrand,
 )  # fmt: skip
-from potto.integrate.decomposition.layers import Exponents, exponents_of
+from potto.integrate.decomposition.dips import singular_at
+from potto.integrate.decomposition.layers import exponents_of
+from potto.integrate.decomposition.lines import Watched, watched
 from potto.integrate.decomposition.vanishing import Vanishing
 from potto.integrate.fixed.straight import StraightIntegral, straight
 from potto.integrate.levels import Group, LevelPlan
@@ -143,12 +145,20 @@ class Plan(Struct, frozen=True, dict=True):
         return straight(integral((last.variable,), self.term.bounds[-1:], self.term.body), self.inlined, (last,))
 
     @cached_property
-    def exponents(self) -> tuple[Exponents | None, ...]:
+    def exponents(self) -> tuple[Watched | None, ...]:
         """By variable what says where exponentials in the integrand have layers."""
         if self.over is not None:
             return (None,) * len(self.levels)
         names = frozenset(self.body.params)
         return tuple(exponents_of(self.mass, level.variable, names) for level in self.levels)
+
+    @cached_property
+    def singular(self) -> tuple[Watched | None, ...]:
+        """By variable what the integrand is singular at 0 of, or nearly so beside it."""
+        if self.over is not None:
+            return (None,) * len(self.levels)
+        names = frozenset(self.body.params)
+        return tuple(watched(singular_at(self.mass), level.variable, names) for level in self.levels)
 
     @cached_property
     def box(self) -> Box | None:

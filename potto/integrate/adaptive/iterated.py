@@ -19,6 +19,7 @@ from potto.integrate.decomposition.corners import corner_rows, within_walls
 from potto.integrate.decomposition.covered import uncovered
 from potto.integrate.decomposition.critical_places import critical_rows
 from potto.integrate.decomposition.cuts import Cuts, at_rest, finite_speeds, frame_rows, on_bounds, segments, standing
+from potto.integrate.decomposition.dips import dip_rows
 from potto.integrate.decomposition.effective_range import Ranges, pulled_in, reaches
 from potto.integrate.decomposition.layers import layer_rows
 from potto.integrate.decomposition.meetings import Row, as_array
@@ -236,11 +237,14 @@ class Iteration(Struct):
         found, lost = self.searched(level, env, lo, hi, batch, machine)
         rows = rows + corners + found
         number = next(n for n, own in enumerate(self.plan.levels) if own is level)
-        exponents = self.plan.exponents[number]
-        if exponents is not None and (self.extent is not None or self.face is not None):  # no line of a sample
+        if self.extent is not None or self.face is not None:  # no line of a sample
+            exponents, singular = self.plan.exponents[number], self.plan.singular[number]
             inner = self.plan.levels[number + 1 :]
-            beside = [row for row in rows if row.cut >= 0 and not level.level.cuts[row.cut].center]
-            rows += layer_rows(exponents, inner, level.variable, env, lo, hi, beside, batch, machine)
+            if exponents is not None:
+                beside = [row for row in rows if row.cut >= 0 and not level.level.cuts[row.cut].center]
+                rows += layer_rows(exponents, inner, level.variable, env, lo, hi, beside, batch, machine)
+            if singular is not None:
+                rows += dip_rows(singular, inner, level.variable, env, lo, hi, batch, machine)
         return lo, hi, rows + shells(lo, hi, rows, batch), lost
 
     def resting(self, level: LevelPlan, lo: Cell, hi: Cell, seg: Segments) -> bool:

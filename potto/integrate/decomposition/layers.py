@@ -11,14 +11,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from msgspec import Struct
 
-from potto.calculus.solving.enclosable import enclosable
-from potto.core.terms import Lam, Term, children, function_of, tuple_
+from potto.core.terms import Term
+from potto.integrate.decomposition.lines import Watched, box_of, on_lines, watched
 from potto.integrate.decomposition.meetings import Row, as_array
 from potto.integrate.levels import HINT, LevelPlan
-from potto.integrate.pieces import Evaluator, gather, numbers_at, still
-from potto.integrate.rules.intervals import Interval, enclosure
+from potto.integrate.pieces import Evaluator
+from potto.integrate.rules.intervals import Interval
 from potto.integrate.rules.steepness import STEEPEST, change, exponents_in
 from potto.kernels.cells import Array, Cell, Ints, Value
 
@@ -27,26 +26,16 @@ from potto.kernels.cells import Array, Cell, Ints, Value
 DEPTH, GONE = 40.0, 745.0
 # How far from a place it is looked, in parts of the range; between two of these it is taken to be linear.
 DISTANCES = 8.0 ** -np.arange(13.0, 0.0, -1.0)
-# Where variables further in are, all of them at once, in parts of their ranges.
-PARTS = (0.0, 0.5, 1.0)
 
 
-class Exponents(Struct, frozen=True):
-    """Those that vary with a variable, and all of them as a function."""
-
-    terms: tuple[Term, ...]
-    function: Lam
-
-
-def exponents_of(body: Term, variable: str, known: frozenset[str]) -> Exponents | None:
+def exponents_of(body: Term, variable: str, known: frozenset[str]) -> Watched | None:
     """The exponents in an integrand that vary with a variable; None if there are none. known: the names that have
     values."""
-    terms = tuple(e for e in exponents_in(body) if variable in e.free and e.free <= known)
-    return Exponents(terms, function_of(tuple_(terms))) if terms else None
+    return watched(exponents_in(body), variable, known)
 
 
 def layer_rows(
-    exponents: Exponents, inner: Sequence[LevelPlan], variable: str, env: Mapping[str, Value], lo: Cell, hi: Cell,
+    exponents: Watched, inner: Sequence[LevelPlan], variable: str, env: Mapping[str, Value], lo: Cell, hi: Cell,
     rows: Sequence[Row], batch: int, machine: Evaluator,
 ) -> list[Row]:  # fmt: skip
     """Rows beside both bounds and the places of other rows, for members on whose ranges an exponent changes much.
@@ -58,7 +47,7 @@ def layer_rows(
     if not steep.size or not _steep_somewhere(exponents, inner, variable, env, (low[steep].min(), high[steep].max())):
         return []
     places = np.stack((low, 0.5 * (low + high), high))[:, steep]
-    values = _at(exponents.function, inner, variable, env, steep, places, machine)
+    values = _at(exponents, inner, variable, env, steep, places, machine)
     values = np.where(np.isfinite(values), values, np.nan)  # where an exponent is infinite, it is so beside no layer
     steep = steep[(np.fmax.reduce(values, axis=2) - np.fmin.reduce(values, axis=2) > STEEPEST).any(axis=(0, 1))]
     if not steep.size:
@@ -71,7 +60,7 @@ def layer_rows(
     for way in (1.0, -1.0):
         far = way * DISTANCES[:, None, None] * length
         there = np.concatenate((middles[None], middles + far)).reshape(-1, steep.size)
-        values = _at(exponents.function, inner, variable, env, steep, there, machine)
+        values = _at(exponents, inner, variable, env, steep, there, machine)
         values = values.reshape(*values.shape[:2], 1 + DISTANCES.size, *middles.shape)
         with np.errstate(invalid="ignore"):
             here, beyond = values[:, :, :1], values[:, :, 1:]
@@ -87,21 +76,13 @@ def layer_rows(
 
 
 def _steep_somewhere(
-    exponents: Exponents, inner: Sequence[LevelPlan], variable: str, env: Mapping[str, Value], ends: Interval
+    exponents: Watched, inner: Sequence[LevelPlan], variable: str, env: Mapping[str, Value], ends: Interval
 ) -> bool:
     """Whether an exponent may be steep for some member, as far as an enclosure over all of them tells."""
-    box: dict[str, Interval] = {}
-    for name, value in env.items():
-        if isinstance(value, Cell):
-            box[name] = (np.min(value.v), np.max(value.v))
-    box[variable] = ends
-    for level in inner:
-        low, high = children(level.bounds.body)
-        if not ((low.free | high.free) <= box.keys() and enclosable(low) and enclosable(high)):
-            return True
-        (least, _), (_, most) = enclosure((low, high), box)
-        box[level.variable] = least, most
-    return not change(exponents.terms, box) <= STEEPEST or any(not e.free <= box.keys() for e in exponents.terms)
+    box = box_of(inner, variable, env, ends)
+    if box is None or any(not e.free <= box.keys() for e in exponents.terms):
+        return True
+    return not change(exponents.terms, box) <= STEEPEST
 
 
 def _reached(change: Array) -> Array:
@@ -116,22 +97,10 @@ def _reached(change: Array) -> Array:
 
 
 def _at(
-    exponents: Lam, inner: Sequence[LevelPlan], variable: str, env: Mapping[str, Value], members: Ints, places: Array,
-    machine: Evaluator,
+    exponents: Watched, inner: Sequence[LevelPlan], variable: str, env: Mapping[str, Value], members: Ints,
+    places: Array, machine: Evaluator,
 ) -> Array:  # fmt: skip
     """Exponents (E, L, P, B) of members (B,) at places (P, B), on lines that lead through the variables further in."""
-    machine = machine.with_directions(0)
-    named = {level.variable for level in inner} & set(exponents.params)
-    parts = np.asarray(PARTS if named else (0.5,))
-    shape = parts.size, *places.shape
-    given = {name: still(value) for name, value in env.items()}
-    here = gather(given, np.broadcast_to(members, shape).ravel())
-    here[variable] = Cell(np.broadcast_to(places, shape).ravel())
-    part = np.broadcast_to(parts[:, None, None], shape).ravel()
-    with np.errstate(all="ignore"):
-        for level in inner if named else ():
-            low, high = (np.broadcast_to(cell.v, part.shape) for cell in numbers_at(level.bounds, machine, here))
-            low, high = (np.where(np.isfinite(end), end, other) for end, other in ((low, high - 1), (high, low + 1)))
-            here[level.variable] = Cell(np.nan_to_num(low + part * (high - low)))
-        values = numbers_at(exponents, machine, {name: here[name] for name in exponents.params})
-        return np.stack([np.broadcast_to(value.v, part.shape).reshape(shape) for value in values])
+    parts = exponents.parts(inner)[:, None, None]
+    wide = np.broadcast_to(places, (parts.size, *places.shape))
+    return on_lines(exponents, inner, variable, env, members, parts, wide, machine)
