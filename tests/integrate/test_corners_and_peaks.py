@@ -133,3 +133,16 @@ def test_peaks_are_found_along_roots_of_any_kind(number: int, n: int) -> None:
         exact = float(mp.quad(lambda x: mp.exp(-((n * center(x)) ** 2)), places))
     # a peak is placed to the rounding of x and of what is 0 there: up to 20n times 1e-16, in parts of its width
     assert abs(answer.value - exact) <= answer.error <= (1e-10 + 3e-14 * n) * exact
+
+
+@pytest.mark.parametrize("k", [3e3, 2e5])
+@pytest.mark.parametrize("t", [0.3, 0.7071])
+def test_what_is_narrow_where_a_divisor_is_small(k: float, t: float) -> None:
+    """Rules of few nodes, too, leave alone what is divided by what grows so much."""
+    f = potto.compile("def f(k, t)\n    integral [0, 1] (1 + 1/(1 + k^2*(x - t)^2)^2) d(x)").f
+    found = f(k, t)
+    with mp.workdps(40):
+        ends = mp.mpf(t), 1 - mp.mpf(t)
+        exact = 1 + mp.fsum(mp.atan(k * u) / (2 * k) + u / (2 * (1 + (k * u) ** 2)) for u in ends)
+        assert abs(found.value - exact) <= found.error + 1e-15
+    assert found.error <= 1e-10

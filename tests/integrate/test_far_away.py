@@ -6,6 +6,7 @@ for the doubles that the program has.
 
 from __future__ import annotations
 
+import math
 from fractions import Fraction
 from typing import Any
 
@@ -109,3 +110,23 @@ def covered(ts: [n] ((Real, Real), (Real, Real), (Real, Real)), px, py, h) integ
     exact = area(in_square(triangle, Fraction(x), Fraction(y), Fraction(h)))
     answer = module.covered(corners[None], x, y, h)
     assert abs(Fraction(answer.value) - exact) <= Fraction(answer.error) < Fraction(1, 10**7)
+
+
+OVERFLOWS = {
+    "exp(-x)*exp(x)": None,
+    "exp(-x)*(exp(x) + t)": None,
+    "exp(-x)*cosh(x/2)": 4 / 3,
+    "exp(-x)*(exp(x)/(1 + x^2))": math.pi / 2,
+}
+
+
+@pytest.mark.parametrize("body", OVERFLOWS)
+def test_what_overflows_far_out_is_nothing_only_where_its_logarithm_says_so(body: str) -> None:
+    found = potto.compile(f"def f(t) integral [0, inf] {body} d(x)").f(1.0)
+    wanted = OVERFLOWS[body]
+    if wanted is None:
+        assert not found.converged
+        assert not math.isfinite(found.error)
+    else:
+        assert found.converged
+        assert abs(found.value - wanted) <= found.error + 1e-15

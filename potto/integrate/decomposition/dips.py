@@ -1,20 +1,20 @@
 """Where ranges are cut around the places at which what a builtin is singular at 0 of comes near to 0.
 
-Owns `dip_rows` and `singular_at`. sqrt(t - cos(x)) is |x| but for a stretch of the length of sqrt(t - 1) around 0, and
-1/(a + x^2) is next to nothing outside of one: no node need be there, though x^2 itself is seen from afar. So the least
-of each radicand, base, divisor, argument of a logarithm is looked for, and how far from it that has become TWICE as
-large. There the range is cut, and GROWTH times farther off, and so on.
+Owns `dip_rows` and `singular_at`. sqrt(t - cos(x)) is |x| but for a stretch as
+long as sqrt(t - 1), and 1/(a + x^2) is next to nothing outside of one: no node need be there, though x^2 itself is
+seen from afar. So the least of each radicand, base, divisor, argument of a logarithm is looked for, and how far from it
+that has become TWICE as large. There the range is cut, and GROWTH times farther off, and so on.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import lru_cache
 
 import numpy as np
 
 from potto.calculus.solving.enclosable import enclosable
-from potto.core.terms import Prim, Term, postorder
+from potto.core.terms import Const, Prim, Term, postorder
 from potto.integrate.decomposition.lines import Watched, box_of, on_lines
 from potto.integrate.decomposition.meetings import Row, as_array
 from potto.integrate.levels import HINT, LevelPlan
@@ -31,7 +31,6 @@ SECTIONS, ROUNDS = 8, 18  # of a stretch around it, and how often it is cut into
 SETTLED = 1.01  # by what factor a number differs over a stretch on which the least is found; beside a root by far more
 SHARE = 2.0  # from such a part of the range on nodes see what there is
 GROWTH = 4.0
-NOTHING = 2.0**-44  # of the largest number: what is less has no digits
 DISTANCES = 2.0 ** -np.arange(52.0, 0.0, -1.0)
 
 
@@ -39,13 +38,31 @@ DISTANCES = 2.0 ** -np.arange(52.0, 0.0, -1.0)
 def singular_at(term: Term) -> tuple[Term, ...]:
     """What builtins in an integrand are singular at 0 of, as far as it can be enclosed."""
     found = (
-        edge.args[0] if isinstance(edge, Prim) and edge.op == "abs" else edge
-        for node in postorder(term)
-        if isinstance(node, Prim)
-        for edge in PRIMITIVES[node.op].edges(*node.args)
-        if edge.free and edge.free <= term.free and enclosable(edge)
+        base
+        for node in _written_out(term)
+        for base in map(_base, PRIMITIVES[node.op].edges(*node.args))
+        if base.free and base.free <= term.free and enclosable(base)
     )
     return tuple(dict.fromkeys(found))
+
+
+def _written_out(term: Term) -> Iterator[Prim]:
+    """The builtins in a term, and those in the formulas of these."""
+    for node in postorder(term):
+        if isinstance(node, Prim):
+            yield node
+            formula = PRIMITIVES[node.op].formula
+            if formula is not None:
+                yield from (part for part in postorder(formula(*node.args)) if isinstance(part, Prim))
+
+
+def _base(edge: Term) -> Term:
+    """What is 0 where this is, and changes its sign there if it can."""
+    while isinstance(edge, Prim) and (
+        edge.op in ("abs", "sqrt", "neg") or (edge.op == "pow" and isinstance(edge.args[1], Const))
+    ):
+        edge = edge.args[0]
+    return edge
 
 
 def dip_rows(
@@ -123,7 +140,7 @@ class _Search:
             most = np.where(size < np.inf, size, 0.0).max(axis=2, keepdims=True)
             wall = np.full((*size.shape[:2], 1, size.shape[3]), np.inf)
             before, after = (np.concatenate(two, axis=2) for two in ((wall, size[:, :, :-1]), (size[:, :, 1:], wall)))
-            lowest = (size <= before) & (size < after) & (FACTOR * size < most) & (size > NOTHING * most)
+            lowest = (size <= before) & (size < after) & (FACTOR * size < most) & (size > 0)
         term, part, number, member = np.nonzero(lowest)
         if not term.size:
             return term, part, member, u[number]
@@ -139,7 +156,7 @@ class _Search:
                 np.take_along_axis(grid, np.clip(best + way, 0, SECTIONS), axis=0)[0] for way in (-1, 0, 1)
             )
             least, most = own.min(axis=0), own.max(axis=0)
-            settled, gone = most <= SETTLED * least, least <= NOTHING * highest
+            settled, gone = most <= SETTLED * least, least <= 0
             if (settled | gone).all():
                 break
         keep = settled & ~gone & (FACTOR * least < highest)

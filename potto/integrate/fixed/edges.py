@@ -16,11 +16,11 @@ EDGE = 0.1
 
 @lru_cache(maxsize=1024)
 def edges_of(term: Term) -> tuple[Term, ...]:
-    """What is 0 where a builtin in a term is singular, poles aside, and varies."""
+    """What is 0 where a builtin in a term is singular, and varies: where a divisor is small, all there is may be."""
     found = (
         edge
         for node in postorder(term)
-        if isinstance(node, Prim) and node.op != "div"
+        if isinstance(node, Prim)
         for edge in PRIMITIVES[node.op].edges(*node.args)
         if edge.free
     )
