@@ -69,6 +69,8 @@ def _node(node: Term, parts: Sequence[int | None]) -> int | None:
             total = known[0]
         case Prim(op="pow", args=(_, Const(value=exponent))) if exponent >= 0 and exponent.is_integer():
             total = known[0] * int(exponent)
+        case Prim() if not any(known):  # of steps
+            total = 0
         case _:
             return None
     return total if total <= MOST else None
