@@ -32,6 +32,12 @@ PAIRS: list[tuple[str, str, str, str, tuple[float, float] | None]] = [
     ("tents", UNIT, "[t - max(abs(2*x - 1), abs(2*y - 1)) > 0]",
      "[2*x - 1 < t]*[1 - 2*x < t]*[2*y - 1 < t]*[1 - 2*y < t]", (T**2, 2 * T)),
     ("discs that meet", DISCS, f"[max({ONE}, {OTHER}) < 0]", f"[{ONE} < 0]*[{OTHER} < 0]", None),
+    ("least of brackets", UNIT, "min([x < t], [y < t])", "[x < t]*[y < t]", (T**2, 2 * T)),
+    ("greatest of brackets", UNIT, "max([x < t], [y < t])", "[x < t or y < t]", (1 - (1 - T) ** 2, 2 - 2 * T)),
+    ("exponentials", DISCS, "[exp(-x^2 - y^2) > exp(-t)]", "[x^2 + y^2 < t]", (math.pi * T, math.pi)),
+    ("reciprocals", DISCS, "[1/(x^2 + y^2) > 1/t]", "[x^2 + y^2 < t]", (math.pi * T, math.pi)),
+    ("product", DISCS, "[(x^2 + y^2 - t)*(x - y) < 0]",
+     "[(x^2 + y^2 < t and x > y) or (x^2 + y^2 > t and x < y)]", (8.0, 0.0)),
     ("discs joined", DISCS, f"[min({ONE}, {OTHER}) < 0]", f"[{ONE} < 0 or {OTHER} < 0]", None),
 ]  # fmt: skip
 

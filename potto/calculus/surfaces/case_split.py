@@ -13,6 +13,7 @@ from collections.abc import Callable, Sequence
 from potto.calculus.algebra.ranges import positive
 from potto.calculus.solving.solve import shared_factors
 from potto.calculus.surfaces.cancelled import without_cancelled
+from potto.calculus.surfaces.comparisons import by_brackets, by_signs, of_arguments
 from potto.calculus.surfaces.nested_brackets import has_nested
 from potto.core.terms import (
     Branch,
@@ -54,7 +55,9 @@ def _changed(term: Integral, change: Callable[[Branch], Term]) -> Integral:
         return change(new) if isinstance(new, Branch) and _bent(new) else new
 
     def plain(_: Term, new: Term) -> Term:
-        return without_cancelled(new, term.variables) if isinstance(new, Branch) else new
+        if isinstance(new, Branch):
+            new = by_signs(of_arguments(new), frozenset(term.variables))
+        return without_cancelled(new, term.variables) if isinstance(new, Branch) else by_brackets(new)
 
     return with_integrand(term, transform(transform(term.body, changed), plain))
 
