@@ -12,6 +12,7 @@ import mpmath
 import pytest
 
 import potto
+from potto.calculus.inlining import unrolled
 
 PROGRAM = """
 def over(y, a) [y > a]
@@ -134,7 +135,11 @@ def test_a_recursion_shows_its_deltas_once_it_is_written_out() -> None:
     assert abs(got.tangent + 2 * slope(A)) <= 1e-14 + got.tangent_error and got.tangent_error <= 1e-11
 
 
-def test_what_is_not_seen_is_refused() -> None:
+def test_what_is_not_seen_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    m = potto.compile(PROGRAM + RECURSION)
+    deep = m.total(500, 0.4)
+    assert abs(deep.value - 500 * M) <= deep.error <= 1e-10
+    monkeypatch.setattr(unrolled, "MOST_CALLS", 400)
     m = potto.compile(PROGRAM + RECURSION)
     for call in (lambda: m.total(500, 0.4), lambda: potto.hessian(m.total, ["a"])(2, 0.4)):
         with pytest.raises(potto.PottoError) as caught:

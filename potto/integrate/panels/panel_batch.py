@@ -22,6 +22,7 @@ from potto.integrate.panels.roundoff import (
     LOOKED_AT,
     WITHIN,
     few_doubles,
+    few_in_all,
     misplaced,
     noise,
     note_ends,
@@ -101,21 +102,14 @@ class PanelBatch(Struct, dict=True):
 
     def enough(self) -> int | None:
         """How many nodes do for an integrand that is a polynomial between its cuts: so many that it is 0 where it is 0
-        at all of them, since they also tell its size. Where nodes round to others than the rule's, one more tells the
-        slope, by which that is put right; where they do on all that there is for a member, many average out. Not where
-        surfaces coincide further in: the faster one binds, and which one that is changes where no cut is."""
-        lengths = self.seg.b - self.seg.a
-        whole = np.zeros(self.batch)
-        np.add.at(whole, self.seg.owner, lengths)
-        if not self.last and few_doubles(self.seg, whole[self.seg.owner, None]):
+        at all of them, since they also tell its size; where nodes round, one more, for the slope that mends it. Not
+        where all of a range rounds, nor where surfaces coincide: the faster one binds, and that changes uncut."""
+        binds = self.k and (self.machine.side or self.machine.events.every(TwoSided))
+        if not self.last and (binds or few_in_all(self.seg, self.batch)):
             return None
-        if not self.last and self.k and (self.machine.side or self.machine.events.every(TwoSided)):
-            return None
-        degrees = self.parent.degrees
-        degree = degrees[self.number] if degrees and not self.seg.kind.any() else None
-        if degree is None or degree >= self.parent.order:
-            return None
-        return degree + (2 if not self.last and few_doubles(self.seg, lengths[:, None]) else 1)
+        degree = self.parent.degrees[self.number] if self.parent.degrees and not self.seg.kind.any() else None
+        few = not self.last and few_doubles(self.seg, (self.seg.b - self.seg.a)[:, None])
+        return None if degree is None or degree >= self.parent.order else degree + (2 if few else 1)
 
     def measure(self, p: Pieces, order: int, whole: bool = False) -> Pieces:
         """Integrals, errors and rounding floors of pieces, chunk by chunk, by the rule with `order` nodes.

@@ -1,7 +1,7 @@
 """What rounding does to the integral over a piece.
 
-Owns `shake` and `few_doubles` (of nodes), `share`, `part_of` and `noise` (of the integrand), `misplaced`, `note_ends`
-and `hidden_steps` (of the ends of segments) and `together` (of derivatives that move with the nodes).
+Owns `shake`, `few_doubles` and `few_in_all` (of nodes), `share`, `part_of` and `noise` (of the integrand), `misplaced`,
+`note_ends` and `hidden_steps` (of the ends of segments) and `together` (of derivatives that move with the nodes).
 """
 
 from __future__ import annotations
@@ -31,6 +31,13 @@ def few_doubles(seg: Segments, weight: Array) -> bool:
     """Whether pieces are so far from 0 for their length that the rounding of nodes is worth putting right."""
     far = np.maximum(np.abs(seg.a), np.abs(seg.b))
     return bool((NODE_ROUNDING * far > FAR * weight[:, 0]).any())
+
+
+def few_in_all(seg: Segments, batch: int) -> bool:
+    """The same of all that there is for some member of a batch."""
+    whole = np.zeros(batch)
+    np.add.at(whole, seg.owner, seg.b - seg.a)
+    return few_doubles(seg, whole[seg.owner, None])
 
 
 def shake(p: Pieces, seg: Segments, x: Array, weight: Array, put_right: bool) -> Array:
