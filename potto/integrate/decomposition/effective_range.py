@@ -20,6 +20,7 @@ from potto.integrate.plan import Plan
 from potto.integrate.rules.gauss import EPS
 from potto.integrate.rules.intervals import ANYTHING, Interval, enclosure
 from potto.integrate.rules.magnitudes import log_magnitude
+from potto.integrate.rules.steepness import exponents_in
 from potto.integrate.rules.substitution import Segments, choose
 from potto.kernels.cells import Array, Cell, Ints, Value
 
@@ -30,6 +31,7 @@ SIZES = np.concatenate((4.0 ** np.arange(-22, 23), 2.0 ** np.arange(56, 964, 12)
 FARTHEST = 2.0**964
 HUGE = 2.0**45  # from here on shells are so long that exponents of both signs are not told from each other
 PARTS = 32  # into which that is divided
+PIECES = 4  # of a shell, of each of which it is told how large logarithms are
 NOTHING = EPS * EPS  # of what a shell holds at most
 Ranges = dict[str, tuple[Array, Array]]
 
@@ -198,9 +200,10 @@ class _Range:
         ends = places[:, :-1], places[:, 1:]
         box = {**self.box, self.level.variable: ends if side > 0 else ends[::-1]}
         lo, hi = (np.broadcast_to(end, ends[0].shape) for end in enclosure((self.body,), box)[0])
-        size = np.maximum(np.abs(lo), np.abs(hi))
-        if np.isnan(size).any():  # 0 times what overflows
-            size = np.where(np.isnan(size), self.by_logarithms(ends), size)
+        unknown = np.isnan(lo)
+        size = np.where(unknown, 0.0, np.maximum(np.abs(lo), np.abs(hi)))
+        if len(exponents_in(self.body)) > 1 and unknown.any():  # 0 times what overflows
+            size = np.where(unknown, self.by_logarithms(ends), size)
         within = volume[:, None]
         if np.isinf(volume).any():  # ranges further in that grow with this variable
             within = np.minimum(within, _stretches(self.plan, self.number, box))
@@ -208,18 +211,24 @@ class _Range:
             return np.where(size == 0, 0.0, size * np.abs(ends[1] - ends[0]) * within)
 
     def by_logarithms(self, ends: tuple[Array, Array]) -> Array:
-        """How large the integrand is at most between places (B, places), a part at a time. Beyond HUGE, where shells
-        are long and exponents beyond what numbers hold, it is no larger than before."""
+        """How large the integrand is at most between places (B, places), a piece at a time; 0 where that is not known.
+        Beyond HUGE, where shells are long and exponents beyond what numbers hold, nothing if it fell off before."""
         shape = ends[0].shape
-        steps = np.linspace(0.0, 1.0, PARTS + 1)
-        with np.errstate(over="ignore", invalid="ignore"):
-            grid = ends[0][..., None] + steps * (ends[1] - ends[0])[..., None]
-            near, far = (part.reshape(shape[0], -1) for part in (grid[..., :-1], grid[..., 1:]))
-            box = {**self.box, self.level.variable: (np.minimum(near, far), np.maximum(near, far))}
-            bound = np.broadcast_to(log_magnitude(self.body, box), near.shape).reshape(*shape, PARTS).max(axis=2)
-            known = np.maximum(np.abs(ends[0]), np.abs(ends[1])) <= HUGE
-            told = np.maximum.accumulate(np.where(known, np.arange(shape[1]), -1), axis=1)
-            return np.exp(np.where(told < 0, np.inf, np.take_along_axis(bound, np.maximum(told, 0), axis=1)))
+        known = np.maximum(np.abs(ends[0]), np.abs(ends[1])) <= HUGE
+        near = np.flatnonzero(known.any(axis=0))
+        bound = np.full(shape, -np.inf)
+        steps = np.linspace(0.0, 1.0, PIECES + 1)
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+            first, last = (end[:, near, None] for end in ends)
+            grid = first + steps * (last - first)
+            one, other = (part.reshape(shape[0], -1) for part in (grid[..., :-1], grid[..., 1:]))
+            box = {**self.box, self.level.variable: (np.minimum(one, other), np.maximum(one, other))}
+            found = np.broadcast_to(log_magnitude(self.body, box), one.shape).reshape(*grid.shape[:2], PIECES)
+            bound[:, near] = np.where(np.isinf(found), -np.inf, found).max(axis=2)
+            held = np.where(known, bound + np.log(np.abs(ends[1] - ends[0])), -np.inf)
+            end = np.maximum(known.sum(axis=1, keepdims=True) - 1, 1)
+            grows = np.take_along_axis(held, end, axis=1) > np.take_along_axis(held, end - 1, axis=1)
+            return np.exp(np.where(known, bound, np.where(grows, np.inf, -np.inf)))
 
 
 def _columns(ends: Interval, batch: int) -> tuple[Array, Array]:
