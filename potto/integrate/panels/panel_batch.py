@@ -21,8 +21,8 @@ from potto.integrate.panels.mending import mend
 from potto.integrate.panels.roundoff import (
     LOOKED_AT,
     WITHIN,
+    coarse,
     few_doubles,
-    few_in_all,
     misplaced,
     noise,
     note_ends,
@@ -103,9 +103,9 @@ class PanelBatch(Struct, dict=True):
     def enough(self) -> int | None:
         """How many nodes do for an integrand that is a polynomial between its cuts: so many that it is 0 where it is 0
         at all of them, since they also tell its size; where nodes round, one more, for the slope that mends it. Not
-        where all of a range rounds, nor where surfaces coincide: the faster one binds, and that changes uncut."""
+        where doubles are coarse, nor where surfaces coincide: the faster one binds, and that changes uncut."""
         binds = self.k and (self.machine.side or self.machine.events.every(TwoSided))
-        if not self.last and (binds or few_in_all(self.seg, self.batch)):
+        if not self.last and (binds or coarse(self.seg)):
             return None
         degree = self.parent.degrees[self.number] if self.parent.degrees and not self.seg.kind.any() else None
         few = not self.last and few_doubles(self.seg, (self.seg.b - self.seg.a)[:, None])

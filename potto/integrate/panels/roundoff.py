@@ -1,6 +1,6 @@
 """What rounding does to the integral over a piece.
 
-Owns `shake`, `few_doubles` and `few_in_all` (of nodes), `share`, `part_of` and `noise` (of the integrand), `misplaced`,
+Owns `shake`, `few_doubles` and `coarse` (of nodes), `share`, `part_of` and `noise` (of the integrand), `misplaced`,
 `note_ends` and `hidden_steps` (of the ends of segments) and `together` (of derivatives that move with the nodes).
 """
 
@@ -18,6 +18,8 @@ from potto.kernels.cells import Array, Ints
 NODE_ROUNDING = 0.5
 # From how many lengths of a piece away from 0 on the rounding of its nodes is put right.
 FAR = 8
+# From which part of a segment's length on the rounding of nodes is averaged out by many; of how many segments.
+COARSE, MANY = 1e-6, 0.25
 # Up to which part of its size two interpolants of one integrand differ at their common end by their rounding; from
 # which on that is a jump, which is looked for where cuts move in different ways (`degenerate.degeneracies`).
 SMOOTH, STEP = 1e-13, 1e-6
@@ -33,11 +35,10 @@ def few_doubles(seg: Segments, weight: Array) -> bool:
     return bool((NODE_ROUNDING * far > FAR * weight[:, 0]).any())
 
 
-def few_in_all(seg: Segments, batch: int) -> bool:
-    """The same of all that there is for some member of a batch."""
-    whole = np.zeros(batch)
-    np.add.at(whole, seg.owner, seg.b - seg.a)
-    return few_doubles(seg, whole[seg.owner, None])
+def coarse(seg: Segments) -> bool:
+    """Whether doubles are COARSE in MANY of the segments: all that there is may be within these."""
+    far = np.maximum(np.abs(seg.a), np.abs(seg.b))
+    return bool((NODE_ROUNDING * EPS * far > COARSE * (seg.b - seg.a)).mean() >= MANY)
 
 
 def shake(p: Pieces, seg: Segments, x: Array, weight: Array, put_right: bool) -> Array:
