@@ -12,13 +12,14 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from msgspec import Struct
 
+from potto.calculus.solving.enclosable import enclosable
 from potto.core.terms import Term, function_of, tuple_
 from potto.integrate.fixed.axes import ENDS, Axis, Raw
 from potto.integrate.fixed.edges import EDGE, edges_of
 from potto.integrate.fixed.moving_sums import product
 from potto.integrate.fixed.straight import RowNumbers, StraightIntegral, rows_between
 from potto.integrate.pieces import Evaluator, dense, numbers_at, still
-from potto.integrate.rules.intervals import Interval
+from potto.integrate.rules.intervals import Interval, enclosure
 from potto.integrate.rules.steepness import STEEPEST, change, exponents_in
 from potto.kernels.cells import Array, Bools, Cell, Ints, Value, map_arrays
 from potto.kernels.whole import UNIT_ROUNDOFF
@@ -126,27 +127,17 @@ class _Cells(Struct, frozen=True):
     def clear_of_edges(self, machine: Evaluator, here: dict[str, Value], shape: tuple[int, ...]) -> Bools:
         """The members on whose cells nothing comes to the edge of where it is analytic, as a root of x does at 0: there
         coefficients fall so slowly that they don't tell; nor do they where an exponent is steep."""
-        fine, found = self.even(here, shape[-1]), edges_of(self.face)
-        if not found:
-            return fine
-        edges = function_of(tuple_(found))
-        for cell in numbers_at(edges, machine, {name: still(here[name]) for name in edges.params}):
-            size = np.broadcast_to(np.abs(cell.v), shape)[:, *_between(len(shape) - 2)].reshape(-1, shape[-1])
-            fine &= size.min(axis=0) > EDGE * size.max(axis=0)
+        found, exponents = edges_of(self.face), exponents_in(self.face)
+        box = _box(here) if found or exponents else {}
+        steep = change(exponents, box) > STEEPEST if exponents else False
+        fine = np.array(np.broadcast_to(~np.asarray(steep), shape[-1:]))
+        near = tuple(edge for edge in found if not _away(edge, box))
+        if near:
+            edges = function_of(tuple_(near))
+            for cell in numbers_at(edges, machine, {name: still(here[name]) for name in edges.params}):
+                size = np.broadcast_to(np.abs(cell.v), shape)[:, *_between(len(shape) - 2)].reshape(-1, shape[-1])
+                fine &= size.min(axis=0) > EDGE * size.max(axis=0)
         return fine
-
-    def even(self, here: Mapping[str, Value], count: int) -> Bools:
-        """The members on whose cells no exponent changes by more than nodes see."""
-        exponents = exponents_in(self.face)
-        if not exponents:
-            return np.ones(count, dtype=bool)
-        box: dict[str, Interval] = {}
-        for name, cell in here.items():
-            if isinstance(cell, Cell):
-                rows = np.atleast_1d(cell.v)
-                rows = rows.reshape(-1, rows.shape[-1])
-                box[name] = rows.min(axis=0), rows.max(axis=0)
-        return np.array(np.broadcast_to(~(change(exponents, box) > STEEPEST), count))
 
     def added(self, nodes: Nodes) -> tuple[Array, list[Array]]:
         """What the nodes amount to, (1 + k, M), and the sizes of coefficients along each variable."""
@@ -236,3 +227,23 @@ def _summed(block: Array, volume: Array) -> Array:
     if k1 > 1:
         total[1:] += np.einsum("nrm,krm->kmn", block[0], volume[1:])
     return total
+
+
+def _box(here: Mapping[str, Value]) -> dict[str, Interval]:
+    """Where numbers are on the cells of members."""
+    box: dict[str, Interval] = {}
+    for name, cell in here.items():
+        if isinstance(cell, Cell):
+            rows = np.atleast_1d(cell.v)
+            rows = rows.reshape(-1, rows.shape[-1])
+            box[name] = rows.min(axis=0), rows.max(axis=0)
+    return box
+
+
+def _away(edge: Term, box: Mapping[str, Interval]) -> bool:
+    """Whether it is known without a look at nodes that no cell comes near to where this is 0."""
+    if not (enclosable(edge) and edge.free <= box.keys()):
+        return False
+    least, most = enclosure((edge,), box)[0]
+    near, far = np.minimum(np.abs(least), np.abs(most)), np.maximum(np.abs(least), np.abs(most))
+    return bool(np.all((np.sign(least) == np.sign(most)) & (near > EDGE * far)))
