@@ -184,6 +184,14 @@ def test_what_does_not_vary_is_found_once() -> None:
     assert answer.evals < 60  # not the product of both
 
 
+def test_what_is_found_once_is_not_found_where_no_side_asks_for_it() -> None:
+    """sqrt(t - 2) has no value at 1, and no x is above 2."""
+    inner = "def inner(t) integral [0, 1] y*sqrt(t - 2) d(y)\n"
+    f = potto.compile(f"{inner}def f(t) integral [0, 1] (if [x > 2] then 1 + inner(t) else x*t) d(x)").f
+    answer = potto.grad(f)(1.0)
+    assert (answer.value, answer.tangent) == pytest.approx((0.5, 0.5), rel=1e-15) and answer.converged
+
+
 def test_a_nonlinear_function_of_an_inner_integral_stays() -> None:
     answer = asked("integral [0, 1] exp(integral [0, 1] [y < x*t] d(y)) d(x)", 0.4)
     holds(answer, rate_of(lambda t: mp.expm1(t) / t, 0.4))

@@ -131,6 +131,12 @@ def builtins(n: int) -> tuple[str, dict[str, float]]:
     return f"def f(t) integral [0, 1] ({terms})*[x < t] d(x)", {"t": 0.7}
 
 
+def nested(n: int) -> tuple[str, dict[str, float]]:
+    """Each integrand is made of the integral before, which does not vary with its variable."""
+    calls = (f"def f{k}(t) integral [0, 1] [x < t]*(0.2 + f{k - 1}(t)) d(x)\n" for k in range(1, n))
+    return f"def f0(t) t\n{''.join(calls)}def f(t) integral [0, 1] [x < t]*(0.2 + f{n - 1}(t)) d(x)", {"t": 0.7}
+
+
 def counted(call: Callable[[], Any]) -> tuple[int, int]:
     """Evaluations, and calls of functions, once everything is made."""
     return call().evals, calls_in(call)
@@ -142,7 +148,7 @@ def counted(call: Callable[[], Any]) -> tuple[int, int]:
     (union, (10, 20, 40, 80)), (chain, (10, 20, 40, 80)),
     (ellipses, (10, 20, 40)), (row, (10, 20)),  # of 40 as small and as far away rounding limits the slope
     (weighted_lines, (8, 16, 32)), (weighted_discs, (4, 8, 16, 32)), (weighted_planes, (8, 16, 32, 64)),
-    (half_planes, (16, 32, 64)),
+    (half_planes, (16, 32, 64)), (nested, (4, 8, 16)),
     (builtins, (80, 160, 320)),  # below, fewer nodes do
 ])  # fmt: skip
 @pytest.mark.parametrize("gradient", [False, True])

@@ -1,7 +1,7 @@
-"""What is found once beside an integral or a fold: what integrands and steps read of arrays at plain places, and
-integrals that conditions compare something with.
+"""What is found once beside an integral or a fold: what integrands and steps read of arrays at plain places, and what
+other integrals give.
 
-Owns `hoisted`, `beside`, `compared` and `with_numbers_named`.
+Owns `hoisted`, `beside`, `found_once` and `with_numbers_named`.
 """
 
 from __future__ import annotations
@@ -64,14 +64,16 @@ def beside(term: Term, varying: frozenset[str]) -> tuple[Term, tuple[Access, ...
     return _named(term, inside, Holding(*ARRAYS), lambda node: isinstance(node, reads))
 
 
-def compared(term: Term, integrals: Callable[[Term], bool]) -> tuple[Term, tuple[Access, ...]]:
-    """An integral with the numbers under names of their own that its conditions compare something with, and that other
-    integrals give: a surface has to be enclosed, or solved for a variable.
+def found_once(term: Integral, integrals: Callable[[Term], bool], everywhere: bool) -> tuple[Term, tuple[Access, ...]]:
+    """An integral with the numbers under names of their own that other integrals give, and that its conditions compare
+    something with: a surface has to be enclosed, or solved for a variable.
 
-    integrals: whether a term leads to any.
+    integrals: whether a term leads to any. everywhere: those as well that the integrand is computed from wherever it
+    is, since it is evaluated many times.
     """
     inside = frozenset(bound(term))
-    numbers = {
+    numbers = set(_numbers(term.body)) if everywhere else set()
+    numbers |= {
         part
         for node in postorder(term)
         if isinstance(node, Branch | Delta) and integrals(node)

@@ -53,7 +53,7 @@ from potto.runtime.evaluation.machine import Machine
 from potto.runtime.integration.driver import integrate
 from potto.runtime.integration.methods.choices import many, preferred, to_be_seen
 from potto.runtime.integration.preparation.arrays import met
-from potto.runtime.integration.preparation.compared import compares
+from potto.runtime.integration.preparation.found_once import finds_once
 from potto.runtime.integration.preparation.prepared import filled, placed, prepared
 from potto.runtime.integration.problem import MOST_LOOKED_AT, Mixed, Problem, linked
 from potto.runtime.integration.settled_calls import Batches, SettledCall, SweptCall, unused
@@ -212,7 +212,7 @@ class Direct(Struct, frozen=True):
             env, members = {n: map_arrays(v, lambda a: float(a.flat[0])) for n, v in env.items()}, 1
         try:
             term, full = filled(self.term, env, reach)
-            if full is not env or met(term, env, reach) or compares(term, env, reach):
+            if full is not env or met(term, env, reach) or finds_once(machine, term, env):
                 return None
             again = machine.directions > 0
             if placed(term, again, reach) is not term or prepared(term, reach) is not term:

@@ -30,7 +30,7 @@ from potto.runtime.evaluation.selection import Pick, by_numbers
 from potto.runtime.integration.derivatives.rims import note_rims
 from potto.runtime.integration.methods.members import Whole
 from potto.runtime.integration.preparation.arrays import Differ, Read, as_written, in_numbers, met, without_arrays
-from potto.runtime.integration.preparation.compared import compares, with_compared
+from potto.runtime.integration.preparation.found_once import finds_once, with_found_once
 from potto.runtime.integration.preparation.prepared import filled, held, placed, prepared
 from potto.runtime.integration.preparation.recursions import in_sight
 from potto.runtime.integration.preparation.taken_apart import together
@@ -43,8 +43,8 @@ def integral(machine: Machine, term: Integral, env: dict[str, Value]) -> Value:
     found beside it, and it is solved in as few directions as there have to be."""
     linker, read = machine.linker, Read()
     term, env = filled(term, env, linker.reach)
-    if compares(term, env, linker.reach):
-        term, env, read = with_compared(machine, term, env)
+    if finds_once(machine, term, env):
+        term, env, read = with_found_once(machine, term, env)
     if met(term, env, linker.reach):
         try:
             ready, env, reads = without_arrays(machine, term, env)
