@@ -123,7 +123,7 @@ def ask_about_file(library: Library, file: str, text: str, whole: Span) -> None:
 @pytest.mark.parametrize("name", FILES)
 def test_every_feature_here_and_there(name: str) -> None:
     library, file, text = opened(name)
-    ask_everything(library, file, text, range(0, len(text) + 1, examples(141, 12)))
+    ask_everything(library, file, text, range(0, len(text) + 1, examples(281, 12)))
 
 
 @pytest.mark.slow
@@ -132,7 +132,7 @@ def test_every_feature_all_along(name: str) -> None:
     """Those that look through the workspace, and every action and proposal resolved; the others as well where there is
     time to ask them everywhere."""
     library, file, text = opened(name)
-    offsets = range(0, len(text) + 1, examples(167, 1))
+    offsets = range(0, len(text) + 1, examples(331, 1))
     if LOOKING:
         ask_everything(library, file, text, offsets)
     db = library.db

@@ -78,4 +78,4 @@ def test_at_some_offsets() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("folder", FOLDERS)
 def test_at_offsets_of_every_example(folder: str) -> None:
-    at_offsets([path for path in FILES if path.parent.name == folder], examples(997, 1))
+    at_offsets([path for path in FILES if path.parent.name == folder], examples(1999, 1))
