@@ -5,11 +5,25 @@ Owns `Colours` and `edits`.
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any
 
 from msgspec import Struct
 
-Numbers = tuple[int, tuple[int, ...]]  # the line of the last word, and five for each word
+from potto_lsp.wire import Encoded
+
+
+class Words(Struct, frozen=True, dict=True):
+    """The words of a piece as numbers: the line of the last one, and five for each, every word placed relative to the
+    one before it. So they are the same wherever the piece stands, but for the first number."""
+
+    last: int
+    numbers: tuple[int, ...]
+
+    @cached_property
+    def text(self) -> bytes:
+        """All but the first number as they are sent."""
+        return b",".join([b"%d" % number for number in self.numbers[1:]])
 
 
 class Colours(Struct, frozen=True):
@@ -17,16 +31,20 @@ class Colours(Struct, frozen=True):
     before."""
 
     id: str
-    parts: list[Numbers]
+    parts: list[Words]
     below: list[int]
 
+    def sent(self) -> Encoded:
+        """All of them, as they are sent."""
+        pieces = [b"%d,%b" % (below, part.text) for part, below in zip(self.parts, self.below)]
+        return Encoded(pieces, {"resultId": self.id}, "data")
+
     def data(self, first: int, last: int) -> list[int]:
-        """The numbers of some pieces. Each word is placed relative to the one before, so the numbers of a piece are the
-        same wherever it stands, but for the first."""
+        """The numbers of some pieces."""
         found: list[int] = []
-        for (_, numbers), below in zip(self.parts[first:last], self.below[first:last]):
+        for part, below in zip(self.parts[first:last], self.below[first:last]):
             found.append(below)
-            found += numbers[1:]
+            found += part.numbers[1:]
         return found
 
 
@@ -41,7 +59,7 @@ def edits(old: Colours, new: Colours) -> list[dict[str, Any]]:
     before, after = old.data(head, len(old.parts) - tail), new.data(head, len(new.parts) - tail)
     if before == after:
         return []
-    start = sum([len(numbers) for _, numbers in old.parts[:head]])
+    start = sum([len(part.numbers) for part in old.parts[:head]])
     shortest = min(len(before), len(after))
     first = _in_common(before, after, shortest)
     last = _in_common(before[::-1], after[::-1], shortest - first)

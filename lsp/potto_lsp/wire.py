@@ -12,7 +12,7 @@ import logging
 import os
 import re
 import select
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from queue import SimpleQueue
 from threading import Lock, Thread
 from typing import Any, BinaryIO, Protocol
@@ -97,12 +97,21 @@ def _length(value: bytes) -> int | None:
 
 class Encoded:
     """A list that is already JSON: answers about whole files are kept in pieces, as they are sent. The items of a piece
-    are separated by commas; empty pieces don't count."""
+    are separated by commas; empty pieces don't count. With `under`, the list is the last field of that object, under
+    the name `field`."""
 
-    __slots__ = ("pieces",)
+    __slots__ = ("field", "pieces", "under")
 
-    def __init__(self, pieces: Iterable[bytes]) -> None:
-        self.pieces = [piece for piece in pieces if piece]
+    def __init__(self, pieces: Iterable[bytes], under: Mapping[str, Any] | None = None, field: str = "") -> None:
+        self.pieces, self.under, self.field = [piece for piece in pieces if piece], under, field
+
+    @property
+    def frame(self) -> tuple[bytes, bytes]:
+        """What stands before the items and behind them."""
+        if self.under is None:
+            return b"[", b"]"
+        empty = json.dumps({**self.under, self.field: []}, separators=(",", ":")).encode("ascii")
+        return empty[:-2], empty[-2:]
 
 
 def framed(message: dict[str, Any]) -> bytes:
@@ -110,18 +119,20 @@ def framed(message: dict[str, Any]) -> bytes:
     # Escaped to ASCII: half of a surrogate pair, which JSON may carry, would not go into UTF-8.
     result = message.get("result")
     if isinstance(result, Encoded):
-        return _framed_list({name: value for name, value in message.items() if name != "result"}, result.pieces)
+        return _framed_list({name: value for name, value in message.items() if name != "result"}, result)
     body = json.dumps(message, separators=(",", ":")).encode("ascii")
     return b"Content-Length: %d\r\n\r\n%b" % (len(body), body)
 
 
-def _framed_list(message: dict[str, Any], pieces: list[bytes]) -> bytes:
+def _framed_list(message: dict[str, Any], result: Encoded) -> bytes:
     """A message with a long list as its result. That may be megabytes, so it is copied only once."""
-    head = json.dumps(message, separators=(",", ":"))[:-1].encode("ascii") + b',"result":['
-    length = len(head) + sum(map(len, pieces)) + max(len(pieces) - 1, 0) + 2
-    first, *rest = pieces or [b""]
+    start, end = result.frame
+    head = json.dumps(message, separators=(",", ":"))[:-1].encode("ascii") + b',"result":' + start
+    end += b"}"
+    length = len(head) + sum(map(len, result.pieces)) + max(len(result.pieces) - 1, 0) + len(end)
+    first, *rest = result.pieces or [b""]
     whole = [b"Content-Length: %d\r\n\r\n%b%b" % (length, head, first), *rest]
-    whole[-1] += b"]}"
+    whole[-1] += end
     return b",".join(whole)
 
 

@@ -3,6 +3,7 @@ queries, not by the clock."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -15,6 +16,7 @@ from potto_lsp.documents import Document
 from potto_lsp.features import FEATURES
 from potto_lsp.session import ClientSession
 from potto_lsp.text import DocumentText
+from potto_lsp.wire import framed
 
 URI = "file:///nowhere/whole.po"
 DOCUMENT = {"textDocument": {"uri": URI}}
@@ -97,7 +99,8 @@ def ask(session: ClientSession, method: str, text: DocumentText) -> Any:
         **DOCUMENT, "range": whole, "position": place, "positions": [place], "context": {"includeDeclaration": True},
     }  # fmt: skip
     with session.analysis.db.evaluating():
-        return FEATURES[method].answer(Ask(session, params))
+        answer = FEATURES[method].answer(Ask(session, params))
+    return json.loads(framed({"id": 1, "result": answer}).partition(b"\r\n\r\n")[2])["result"]
 
 
 @contextmanager

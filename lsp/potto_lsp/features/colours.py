@@ -12,22 +12,22 @@ from potto.ide.names.places import PieceAt
 from potto.modules import chunk_text
 from potto.query import Database, query
 from potto_lsp.asking import Ask
-from potto_lsp.colouring import Colours, Numbers, edits
+from potto_lsp.colouring import Colours, Words, edits
 from potto_lsp.features import TOKEN_MODIFIERS, TOKEN_TYPES
 from potto_lsp.features.whole import lined
 from potto_lsp.text import DocumentText, Encoding
+from potto_lsp.wire import Encoded
 
 _TYPES = {name: number for number, name in enumerate(TOKEN_TYPES)}
 _MODIFIERS = {name: 1 << number for number, name in enumerate(TOKEN_MODIFIERS)}
 _ids = itertools.count(1)
 
 
-def full(ask: Ask) -> dict[str, Any]:
-    new = _remember(ask)
-    return {"resultId": new.id, "data": new.data(0, len(new.parts))}
+def full(ask: Ask) -> Encoded:
+    return _remember(ask).sent()
 
 
-def delta(ask: Ask) -> dict[str, Any]:
+def delta(ask: Ask) -> dict[str, Any] | Encoded:
     """What changed since the client's last answer; everything if that one is not known any more."""
     old = ask.session.tokens.get(ask.file)
     if old is None or old.id != ask.optional("previousResultId"):
@@ -38,15 +38,15 @@ def delta(ask: Ask) -> dict[str, Any]:
 
 def _remember(ask: Ask) -> Colours:
     """The colours of a file, put together from those of its pieces."""
-    parts: list[Numbers] = []
+    parts: list[Words] = []
     below: list[int] = []
     before, encoding = 0, ask.text.encoding
     for at, line in lined(ask):
-        found = last, numbers = _of_piece(ask.db, ask.file, at.text, at.hidden, encoding)
-        if numbers:
+        found = _of_piece(ask.db, ask.file, at.text, at.hidden, encoding)
+        if found.numbers:
             parts.append(found)
-            below.append(line + numbers[0] - before)
-            before = line + last
+            below.append(line + found.numbers[0] - before)
+            before = line + found.last
     made = ask.session.tokens[ask.file] = Colours(f"tokens-{next(_ids)}", parts, below)
     return made
 
@@ -54,11 +54,11 @@ def _remember(ask: Ask) -> Colours:
 def in_range(ask: Ask) -> dict[str, Any]:
     found = ide.semantic_tokens(ask.db, ask.file, ask.span)
     words = ((token.span.start, token.span.end, token.type, token.modifiers) for token in found)
-    return {"data": list(_numbers(ask.text, words)[1])}
+    return {"data": list(_numbers(ask.text, words).numbers)}
 
 
 @query(keep=1024)
-def _of_piece(db: Database, file: str, text: str, hidden: tuple[str, ...], encoding: Encoding) -> Numbers:
+def _of_piece(db: Database, file: str, text: str, hidden: tuple[str, ...], encoding: Encoding) -> Words:
     """The words of a piece as numbers, as if it stood at the head of its file: those of its chunks, one behind the
     other."""
     found: list[int] = []
@@ -67,31 +67,31 @@ def _of_piece(db: Database, file: str, text: str, hidden: tuple[str, ...], encod
         line = place.lines.line_of(chunk.start)
         if place.lines.start(line) != chunk.start:  # behind a byte order mark, or blanks
             words = loose_words(db, file, chunk.text)
-            (last, numbers), line = _numbers(place, words, chunk.start), 0
+            part, line = _numbers(place, words, chunk.start), 0
         elif name is None:
-            last, numbers = _of_the_rest(db, file, chunk.text, encoding)
+            part = _of_the_rest(db, file, chunk.text, encoding)
         else:
-            last, numbers = _of_definition(db, file, name, encoding)
-        if numbers:
-            found.append(line + numbers[0] - before)
-            found += numbers[1:]
-            before = line + last
-    return before, tuple(found)
+            part = _of_definition(db, file, name, encoding)
+        if part.numbers:
+            found.append(line + part.numbers[0] - before)
+            found += part.numbers[1:]
+            before = line + part.last
+    return Words(before, tuple(found))
 
 
 @query
-def _of_definition(db: Database, file: str, name: str, encoding: Encoding) -> Numbers:
+def _of_definition(db: Database, file: str, name: str, encoding: Encoding) -> Words:
     """The words of a definition as numbers, as if it stood at the beginning of its file."""
     return _numbers(DocumentText(chunk_text(db, file, name) or "", encoding), definition_words(db, file, name))
 
 
 @query(keep=8192)
-def _of_the_rest(db: Database, file: str, text: str, encoding: Encoding) -> Numbers:
+def _of_the_rest(db: Database, file: str, text: str, encoding: Encoding) -> Words:
     """Those of a chunk that defines nothing."""
     return _numbers(DocumentText(text, encoding), loose_words(db, file, text))
 
 
-def _numbers(text: DocumentText, words: Iterable[Word], start: int = 0) -> Numbers:
+def _numbers(text: DocumentText, words: Iterable[Word], start: int = 0) -> Words:
     """Words as numbers, counted from `start` of a text."""
     found: list[int] = []
     before_line = before_column = 0
@@ -103,4 +103,4 @@ def _numbers(text: DocumentText, words: Iterable[Word], start: int = 0) -> Numbe
         bits = sum([_MODIFIERS[name] for name in modifiers])
         found += (line - before_line, column - before_column, length, _TYPES[type], bits)
         before_line, before_column = line, column
-    return before_line, tuple(found)
+    return Words(before_line, tuple(found))
