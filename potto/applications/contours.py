@@ -1,6 +1,6 @@
 """Where a function over the plane is zero, as short straight lines: marching squares.
 
-Owns `zero_lines`.
+Owns `zero_lines` and `spread`.
 """
 
 from __future__ import annotations
@@ -45,3 +45,18 @@ def _crossings(values: Array, xs: Array, ys: Array, row: Ints, column: Ints, edg
     x = xs[c0] + share * (xs[c1] - xs[c0])
     y = ys[r0] + share * (ys[r1] - ys[r0])
     return np.stack((x, y), axis=-1)
+
+
+def spread(points: Array, apart: float) -> Ints:
+    """Which of points (n, 2) along curves to show so that two are hardly ever closer than `apart`: from the leftmost on
+    always the nearest of those that are far enough from all before."""
+    left, found = np.lexsort(points.T[::-1]), list[int]()
+    at = 0
+    while len(left):
+        found.append(int(left[at]))
+        distance = np.linalg.norm(points[left] - points[left[at]], axis=1)
+        far = distance >= apart
+        far[at] = False
+        left, distance = left[far], distance[far]
+        at = int(np.argmin(distance)) if len(left) else 0
+    return np.array(found, dtype=int)

@@ -14,7 +14,7 @@ from typing import Any
 
 import msgspec
 
-from potto.applications.integral_pictures import integral_svg, remarks, told, typeset
+from potto.applications.integral_pictures import comment, integral_svg, remarks, told, typeset
 from potto.applications.integral_scenes import IntegralScene, Shot
 from potto.applications.integral_views import FRAME
 from potto.calculus.explanation.layout import DerivativeText
@@ -151,7 +151,7 @@ def _surfaces(shot: Shot) -> list[dict[str, Any]]:
         {
             "equation": typeset(s.equation),
             "condition": s.condition,
-            "inside": bool(s.lines),
+            "comment": comment(s),
             "gain": s.gain,
         }
         for s in shot.view.surfaces

@@ -12,8 +12,9 @@ from collections.abc import Mapping
 import numpy as np
 from msgspec import Struct
 
+from potto.applications.integral_numbers import IntegralNumbers, numbers
 from potto.applications.integral_pictures import integral_svg, words
-from potto.applications.integral_views import FRAME, IntegralNumbers, IntegralView, Viewer, numbers
+from potto.applications.integral_views import FRAME, IntegralView, Viewer
 from potto.calculus.explanation.notation import written_notation
 from potto.checking.regions import DrawnIntegral, indices, regions
 from potto.core.terms import ZERO, Lam, Term, app, lam, tuple_, var

@@ -10,18 +10,17 @@ from __future__ import annotations
 import math
 import re
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from msgspec import Struct
 
-from potto.applications.contours import zero_lines
+from potto.applications.contours import spread, zero_lines
+from potto.applications.integral_numbers import Compile, constant
 from potto.checking.regions import DrawnIntegral, RegionSurface
-from potto.core.terms import ZERO, Const, Lam
+from potto.core.terms import ZERO, Lam
 from potto.kernels.cells import Array, Cell, Value
-from potto.python.terms import TermFunction
-from potto.runtime.answers.estimate import Estimate
 from potto.runtime.evaluation.machine import WATCHING
 
 PLACES = 257  # along a curve
@@ -31,12 +30,10 @@ FRAME = 0.016  # seconds
 REACH = 6.0  # how far an endless range is drawn
 ARROWS = 24  # of one surface, at most
 NODES = 1500
-STEP = 1e-3  # of the parameter, or of 1 where that is more
-TINY = 1e-13
+ALONG = 9  # parts of a bound, between which its arrows stand
 PARTS, CLOSER = 1024, 5  # a root is looked for in so many parts, so often: its ends are neighbours then
 
 _NAME = re.compile(r"[^\W\d]\w*(?:\.\w+)*")
-Compile = Callable[[Lam], TermFunction]
 Point = tuple[float, ...]
 Line = tuple[Point, Point]
 
@@ -70,6 +67,7 @@ class IntegralView(Struct, frozen=True):
     each way that the surfaces can be on their sides; -1 outside of the domain. integrand: PLACES numbers, or rows
     from below. held: the variables that are not seen, and where they stand. ghosts: where surfaces and bounds are
     when the parameter is a step less, and a step more. nodes: where the integrand was evaluated for the value.
+    outline: the corners of the domain, piece by piece, where that is not all of the box.
     """
 
     variables: tuple[str, ...]
@@ -83,55 +81,7 @@ class IntegralView(Struct, frozen=True):
     unseen: bool = False  # whether there are surfaces that are not drawn
     ghosts: tuple[tuple[Line, ...], tuple[Line, ...]] = ((), ())
     nodes: tuple[Point, ...] = ()
-
-
-class IntegralNumbers(Struct, frozen=True):
-    """An integral and its derivative by the parameter that moves, each with its error. interior: what the derivative is
-    while surfaces and bounds stand still; boundary: the rest. difference: the central difference over `step` to both
-    sides, a ghost to hold the derivative against, and how far errors of values may move it; None if nobody asked."""
-
-    value: float
-    error: float
-    tangent: float
-    tangent_error: float
-    interior: float
-    interior_error: float
-    boundary: float
-    boundary_error: float
-    difference: float | None
-    difference_error: float
-    step: float
-    converged: bool
-    evals: int
-
-
-def numbers(
-    region: DrawnIntegral, compile: Compile, given: Mapping[str, float], wrt: str, step: float | None = None,
-    quick: bool = False,
-) -> IntegralNumbers:  # fmt: skip
-    """The integral and its derivative by `wrt`, and a difference over `step`; if it is to be quick, that only where a
-    step is named. Raises PottoError where there is none."""
-    whole = compile(region.whole)
-    at = [given[name] for name in region.whole.params]
-    both = whole.gradient(wrt, *at)
-    still = _constant(region.interior)
-    inner = compile(region.interior)(*at) if still is None else Estimate(still, 0.0)
-    rest, error = both.tangent - inner.value, both.tangent_error + inner.error
-    if abs(rest) <= max(error, TINY * max(abs(both.tangent), abs(inner.value))):
-        rest, error = 0.0, error if rest else 0.0
-    difference, off, evals = None, 0.0, both.evals + inner.evals
-    wanted = step is not None or not quick
-    step = STEP * max(1.0, abs(given[wrt])) if step is None else step
-    if wanted:
-        sides = {**given, wrt: given[wrt] + step * np.array([-1.0, 1.0])}
-        beside = whole(*(sides[name] for name in region.whole.params))
-        difference, off = float(np.diff(beside.value)[0]) / (2 * step), float(np.sum(beside.error)) / (2 * step)
-        evals += beside.evals
-    return IntegralNumbers(
-        float(both.value), float(both.error), float(both.tangent), float(both.tangent_error),
-        float(inner.value), float(inner.error), float(rest), float(error), difference, off, step,
-        bool(both.converged and inner.converged), evals,
-    )  # fmt: skip
+    outline: tuple[tuple[Point, ...], ...] = ()
 
 
 class Viewer:
@@ -172,7 +122,7 @@ class Viewer:
             self.seen, tuple(box), _rows(np.where(inside, values, np.nan)), _rows(cells), surfaces,
             self._bounds(places, box), tuple(held), cut, self.region.unseen,
             self._ghosts(places, grids, wrt, ghost) if ghost else ((), ()),
-            self._nodes(given, box) if nodes else (),
+            self._nodes(given, box) if nodes else (), self._outline(grids, places) if len(grids) == 2 else (),
         )  # fmt: skip
         if quick:
             self._fit(time.perf_counter() - start)
@@ -199,12 +149,45 @@ class Viewer:
                 if len(ends):
                     middles = dict(zip(self.seen, ends.mean(axis=1).T, strict=True))
                     found += _lines(ends[np.nonzero(self._inside({**there, **middles}))[0]])
-            for axis in range(len(self.seen)):
-                for low_or_high, rate in zip(self.region.bounds[axis], self.region.rates[axis], strict=True):
-                    if rate.body is not ZERO:
-                        found += _edge(self._number(low_or_high, there), axis, grids)
+            for axis, rates in enumerate(self.region.rates[: len(self.seen)]):
+                for end in (0, 1):
+                    found += self._edge(axis, end, there, grids) if rates[end].body is not ZERO else ()
             sides.append(tuple(found))
         return sides[0], sides[1]
+
+    def _edge(self, axis: int, end: int, places: Mapping[str, Any], grids: Sequence[Array]) -> tuple[Line, ...]:
+        """A bound as lines: across the second variable's range there, or along the first one's."""
+        if axis == 0:
+            at = self._number(self.region.bounds[0][end], places)
+            if not np.isfinite(at):
+                return ()
+            if len(grids) == 1:
+                return (((at,), (at,)),)
+            low, high = self._second({**places, self.seen[0]: at})
+            return (((at, float(low)), (at, float(high))),) if low <= high else ()
+        sides = self._second({**places, self.seen[0]: grids[0]})
+        points = np.stack([grids[0], sides[end]], axis=1)
+        there = sides[0] <= sides[1]
+        return _lines(np.stack([points[:-1], points[1:]], axis=1)[there[:-1] & there[1:]])
+
+    def _second(self, places: Mapping[str, Any]) -> Any:
+        """From and to of the second variable, as far as they are drawn."""
+        low, high = (self._numbers(bound, places) for bound in self.region.bounds[1])
+        return np.where(np.isfinite(low), low, -REACH), np.where(np.isfinite(high), high, REACH)
+
+    def _outline(self, grids: Sequence[Array], places: Mapping[str, Any]) -> tuple[tuple[Point, ...], ...]:
+        """The domain as polygons, where its second range depends on the first variable."""
+        low, high = self._second({**places, self.seen[0]: grids[0]})
+        if np.ptp(low) == 0 and np.ptp(high) == 0:
+            return ()
+        xs, low, high = _with_corners(grids[0], low, high)
+        there = np.nonzero(low <= high)[0]
+        runs = [run for run in np.split(there, np.nonzero(np.diff(there) > 1)[0] + 1) if len(run) > 1]
+        pieces: list[tuple[Point, ...]] = []
+        for run in runs:
+            x, y = np.concatenate([xs[run], xs[run[::-1]]]), np.concatenate([low[run], high[run[::-1]]])
+            pieces.append(tuple(zip(x.tolist(), y.tolist(), strict=True)))
+        return tuple(pieces)
 
     def _mesh(self, grids: Sequence[Array]) -> dict[str, Any]:
         return dict(zip(self.seen, np.meshgrid(*grids), strict=True))
@@ -238,7 +221,7 @@ class Viewer:
 
     def _numbers(self, term: Lam, at: Mapping[str, Any]) -> Array:
         given = [at[name] for name in self.region.names]
-        plain = _constant(term)
+        plain = constant(term)
         found = self._compiled(term).values(*given) if plain is None else plain
         numbers: Array = np.broadcast_to(found, np.broadcast_shapes(*map(np.shape, given)))
         return numbers
@@ -253,9 +236,9 @@ class Viewer:
         cut = False
         for name, (from_, to) in zip(self.region.variables, self.region.bounds, strict=True):
             at = dict(places)
-            if box and name in self.seen:  # a bound that bends: all of what it reaches
-                first = self.seen[0]
-                at[first] = np.linspace(*box[0], SIDE)
+            if box:  # a bound that bends: all of what it reaches
+                grids = [np.linspace(*reach, SIDE if name in self.seen else COARSEST) for reach in box]
+                at |= dict(zip(self.seen, np.meshgrid(*grids), strict=False))
             lows, highs = self._numbers(from_, at), self._numbers(to, at)
             low, high = float(np.min(lows)), float(np.max(highs))
             cut = cut or not np.isfinite([low, high]).all()
@@ -269,7 +252,7 @@ class Viewer:
 
     def _inside(self, at: Mapping[str, Any]) -> Any:
         found: Any = True
-        for name, (low, high) in zip(self.seen, self.region.bounds, strict=False):
+        for name, (low, high) in zip(self.region.variables, self.region.bounds, strict=True):
             found = found & (at[name] >= self._numbers(low, at)) & (at[name] <= self._numbers(high, at))
         return found
 
@@ -297,9 +280,9 @@ class Viewer:
         lengths = np.ones(len(ends)) if len(grids) == 1 else np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
         chosen = np.nonzero(keep)[0]
         lines = _lines(ends[chosen])
-        around = middles[chosen] - middles[chosen].mean(axis=0) if len(chosen) else middles[chosen]
-        order = np.argsort(np.arctan2(around[:, -1], around[:, 0]), kind="stable")
-        shown = chosen[order][:: max(1, -(-len(chosen) // ARROWS))]
+        shares = ends[chosen] / np.array([np.ptp(grid) or 1.0 for grid in grids])
+        long = float(np.sum(np.linalg.norm(shares[:, 1] - shares[:, 0], axis=1)))
+        shown = chosen[spread(shares.mean(axis=1), long / ARROWS)]
         arrows = () if surface.jump is None else _arrows(middles[shown], velocities[shown], weights[shown])
         gain = float(np.sum(weights * lengths))
         return SurfaceView(surface.equation, lines, arrows, gain, self._condition(surface))
@@ -325,10 +308,16 @@ class Viewer:
     def _bounds(self, places: Mapping[str, Any], box: Sequence[tuple[float, float]]) -> tuple[Arrow, ...]:
         """What bounds that move gain: at the ends of the range, or along the sides of the box."""
         found: list[Arrow] = []
+        shares = np.linspace(0, 1, ALONG + 1)[1:-1]
         for axis, name in enumerate(self.seen):
-            other = np.linspace(*box[1 - axis], 9)[1:-1] if len(box) == 2 else np.zeros(1)
             for end, sign in ((0, -1.0), (1, 1.0)):
-                at = dict(places)
+                at, other = dict(places), np.zeros(1)
+                if len(box) == 2 and axis == 0:
+                    at[name] = self._number(self.region.bounds[0][end], at)
+                    low, high = self._second(at)
+                    other = low + shares * (high - low)
+                elif len(box) == 2:
+                    other = box[0][0] + shares * (box[0][1] - box[0][0])
                 if len(box) == 2:
                     at[self.seen[1 - axis]] = other
                 ends = np.broadcast_to(self._numbers(self.region.bounds[axis][end], at), other.shape)
@@ -340,28 +329,22 @@ class Viewer:
                 points = np.stack([ends] if len(box) == 1 else [ends, other][:: 1 - 2 * axis], axis=1)
                 moves = np.zeros_like(points)
                 moves[:, axis] = rate
-                found += _arrows(points, moves, gain)
+                there = np.broadcast_to(self._inside(at), other.shape)
+                found += _arrows(points[there], moves[there], gain[there])
         return tuple(found)
-
-
-def _constant(term: Lam) -> float | None:
-    """The number that a function gives everywhere, if that is what it is."""
-    return term.body.value if isinstance(term.body, Const) else None
 
 
 def _lines(ends: Array) -> tuple[Line, ...]:
     return tuple((tuple(a), tuple(b)) for a, b in ends.tolist())
 
 
-def _edge(at: float, axis: int, grids: Sequence[Array]) -> list[Line]:
-    """A bound as a line across the box."""
-    if not np.isfinite(at):
-        return []
-    if len(grids) == 1:
-        return [((at,), (at,))]
-    low, high = (float(grids[1 - axis][end]) for end in (0, -1))
-    ends = ((at, low), (at, high)) if axis == 0 else ((low, at), (high, at))
-    return [ends]
+def _with_corners(xs: Array, low: Array, high: Array) -> tuple[Array, Array, Array]:
+    """Two sides of a domain with the places between others where they meet, as far as they are straight there."""
+    apart = high - low
+    at = np.nonzero((apart[1:] < 0) != (apart[:-1] < 0))[0]
+    share = apart[at] / (apart[at] - apart[at + 1])
+    x, y = (side[at] + share * (side[at + 1] - side[at]) for side in (xs, high))
+    return np.insert(xs, at + 1, x), np.insert(low, at + 1, y), np.insert(high, at + 1, y)
 
 
 def _drawn(low: float, high: float) -> tuple[float, float]:

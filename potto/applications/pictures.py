@@ -183,9 +183,9 @@ class Plot(Struct, frozen=True):
         return png(pixels)
 
 
-def ticks(low: float, high: float) -> list[float]:
-    """Round numbers from low to high, `MOST_TICKS` at the most: steps of 1, 2 or 5 times a power of ten."""
-    rough = (high - low) / MOST_TICKS
+def ticks(low: float, high: float, most: int = MOST_TICKS) -> list[float]:
+    """Round numbers from low to high, about `most` at the most: steps of 1, 2 or 5 times a power of ten."""
+    rough = (high - low) / most
     power = 10.0 ** math.floor(math.log10(rough))
     step = power * next(m for m in (1, 2, 5, 10) if m * power >= rough * (1 - 1e-9))
     first = math.ceil(low / step - 1e-9)

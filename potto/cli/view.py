@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
 SUMMARY = "look at an integral: its domain, what jumps where, and what moves"
 EXAMPLE = """  potto view examples/worked/picture.po pixel x=0.7 y=0 r=0.7 --wrt r -o pixel.svg
+  potto view examples/worked/picture.po pixel --step 0.01 --nodes -o pixel.svg
   potto view examples/worked/picture.po"""
 
 
@@ -26,6 +27,9 @@ def configure(parser: argparse.ArgumentParser) -> None:
                         "derivative depends)")  # fmt: skip
     parser.add_argument("--integral", metavar="N", type=_count, default=1, help="which one of several (default 1)")
     parser.add_argument("-o", "--output", metavar="FILE", help="write a picture, .svg (else: a page in the browser)")
+    parser.add_argument("--step", metavar="H", type=_step, help="also draw surfaces and bounds a step before and a "
+                        "step after, and take the difference over it")  # fmt: skip
+    parser.add_argument("--nodes", action="store_true", help="draw where the integrand is evaluated")
     parser.add_argument("--no-open", action="store_true", help="print the address of the page, and open no browser")
     add_set(parser)
     add_options(parser)
@@ -35,6 +39,16 @@ def _count(text: str) -> int:
     if not text.isdecimal() or not int(text):
         raise argparse.ArgumentTypeError(f"{text!r} is not the number of an integral; they count from 1")
     return int(text)
+
+
+def _step(text: str) -> float:
+    try:
+        step = float(text)
+    except ValueError:
+        step = 0.0
+    if not 0 < step < float("inf"):
+        raise argparse.ArgumentTypeError(f"{text!r} is not a step; it is a number greater than 0")
+    return step
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
@@ -71,7 +85,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
         with settings(**asdict(chosen)):
             found = IntegralScene(world, file, options.name, dict(options.given))
             wrt = options.wrt or found.moving
-            shot = found.look(found.values, wrt, options.integral - 1)
+            shot = found.look(found.values, wrt, options.integral - 1, options.step, options.nodes)
     except PottoError as error:
         return fail(error, options, console)
     if path is not None and not _written(path, shot.svg, console):

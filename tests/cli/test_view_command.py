@@ -16,6 +16,15 @@ def test_a_picture_is_written(potto: Potto, tmp_path: Path) -> None:
     assert "x = t" in (tmp_path / "f.svg").read_text(encoding="utf-8")
 
 
+def test_a_picture_has_what_is_asked_for(potto: Potto, tmp_path: Path) -> None:
+    """The surface a step before and after, places of evaluation, and the difference over that step."""
+    assert potto("view", "main.po", "f", "-o", "f.svg", "--step", "0.125", "--nodes",
+                 main=PROGRAM.replace("k*", "k*exp(x)*")).status == 0  # fmt: skip
+    text = (tmp_path / "f.svg").read_text(encoding="utf-8")
+    assert text.count('class="ghost"') == 2 and 'class="node"' in text and "central difference, t ± 0.12 = " in text
+    assert potto("view", "main.po", "f", "--step", "-1", "-o", "f.svg", main=PROGRAM).status == 2
+
+
 def test_values_start_as_a_live_expression_gives_them(potto: Potto) -> None:
     answer = potto("view", "main.po", "f", "--json", main=PROGRAM).json
     assert answer["values"] == {"t": 0.25, "k": 2.0}

@@ -11,9 +11,10 @@ import pytest
 from msgspec import Struct
 
 from potto.applications import integral_scenes
+from potto.applications.integral_numbers import IntegralNumbers
 from potto.applications.integral_pictures import remarks, told
 from potto.applications.integral_scenes import IntegralScene
-from potto.applications.integral_views import IntegralNumbers, IntegralView
+from potto.applications.integral_views import IntegralView
 from potto.diagnostics import PottoError
 from potto.evaluating.world import World
 
@@ -233,15 +234,59 @@ def test_what_cannot_be_seen_says_why(name: str, wrt: str, which: int, says: str
         looked(name, wrt, which, t=0.5)
 
 
+def texts(svg: str) -> list[tuple[float, str]]:
+    """What is written in a picture, and how far down."""
+    found = ElementTree.fromstring(svg).iter("{http://www.w3.org/2000/svg}text")
+    return [(float(text.get("y", "nan")), text.text or "") for text in found]
+
+
 def test_what_stands_beside_a_picture_does_not_lie_on_other_words() -> None:
     """The title, what goes up, and the greatest number of the scale; surfaces are set as mathematics is."""
-    root = ElementTree.fromstring(looked("disc", "r", r=0.5).svg)
-    texts = [(float(t.get("y", "nan")), t.text) for t in root.iter("{http://www.w3.org/2000/svg}text")]
-    for flat in (looked("step", "t", t=0.3).svg, looked("disc", "r", r=0.5).svg):
-        above = sorted(float(t.get("y", "nan")) for t in ElementTree.fromstring(flat).iter(
-            "{http://www.w3.org/2000/svg}text") if float(t.get("y", "nan")) < 50)  # fmt: skip
-        assert len(above) == 3 and min(b - a for a, b in pairwise(above)) >= 12
-    assert any("x² + y² = r²" in (text or "") for _, text in texts)
+    for svg in (looked("step", "t", t=0.3).svg, looked("disc", "r", r=0.5).svg):
+        above = sorted(y for y, _ in texts(svg))[:3]
+        assert min(b - a for a, b in pairwise(above)) >= 12
+    assert any("x² + y² = r²" in text for _, text in texts(looked("disc", "r", r=0.5).svg))
+
+
+def test_numbers_of_the_axes_are_round() -> None:
+    """1, 2 or 5 times a power of ten apart: up to 0.9 and from 0.36 to 1.2, in fifths."""
+    step, moving = looked("step", "t", t=0.3), looked("moving", "t", t=0.6)
+    scales = [[text for _, text in texts(shot.svg) if text.replace(".", "").isdecimal()] for shot in (step, moving)]
+    fifths = ["0", "0.2", "0.4", "0.6", "0.8", "1", "1.2"]
+    assert scales == [[*fifths[:6], *fifths[:5]], [*fifths[2:], "0", "0.5", "1", "1.5"]]
+
+
+def test_a_bound_that_leans_is_drawn_as_it_is() -> None:
+    """y <= t*x of x from t to 1: its edge, a step of t to both sides, and arrows only where the domain is."""
+    world = World()
+    program = "def fan(t) integral ([t, 1], [0, t*x]) x + y d(x, y)"
+    view = IntegralScene(world, world.put("fan.po", program), "fan", {}).look({"t": 0.5}, "t", ghost=0.1).view
+    (outline,) = view.outline
+    assert {(0.5, 0.0), (1.0, 0.0), (0.5, 0.25), (1.0, 0.5)} <= set(outline)
+    for lines, t in zip(view.ghosts, (0.4, 0.6), strict=True):
+        assert ((t, 0.0), (t, pytest.approx(t * t))) in lines
+        leaning = [end for line in lines for end in line if end[0] != t]
+        assert leaning and all(y == pytest.approx(t * x) for x, y in leaning)
+    for arrow in view.bounds:
+        (x, y), (u, v) = arrow.at, arrow.velocity
+        assert (u, v, arrow.weight) in (
+            (1, 0, pytest.approx(-x - y)),
+            (0, pytest.approx(x), pytest.approx(x * (x + y))),
+        )
+        assert 0 <= y <= 0.5 * x + 1e-15
+
+
+def test_a_section_goes_through_the_middle_of_the_whole_range() -> None:
+    """Of a tetrahedron at z = 1/2: what is left of it is x + y <= 1/2."""
+    world = World()
+    program = "def tetra(c) integral ([0, 1], [0, 1 - x], [0, 1 - x - y]) [x < c] d(x, y, z)"
+    view = IntegralScene(world, world.put("tetra.po", program), "tetra", {}).look({"c": 0.25}, "c").view
+    assert view.held == (("z", 0.5),)
+    side = len(view.cells)
+    seen = {
+        (j / (side - 1), i / (side - 1)) for i, row in enumerate(view.cells) for j, cell in enumerate(row) if cell >= 0
+    }
+    assert max(x + y for x, y in seen) == pytest.approx(0.5)
 
 
 INDEXED = r"""

@@ -102,7 +102,7 @@ function tell(found, whole) {
 function show(figure, shot, beside) {
   const rows = shot.told.map(([name, value], place) => {
     const kind = ["interior", "boundary"].includes(name) ? "part" : place > 3 ? "quiet" : "";
-    const row = make("tr", { className: kind }, make("td", { textContent: name.replace(/^central |:$/g, "") }), make("td", { textContent: value }));
+    const row = make("tr", { className: kind }, make("td", { textContent: name.replace(/^central /, "") }), make("td", { textContent: value }));
     if (beside && beside !== shot && beside.body.name === shot.body.name && beside.wrt === shot.wrt)
       row.append(make("td", { className: "changed", textContent: difference(shot, beside, place), title: "less the pinned one" }));
     return row;
@@ -124,11 +124,11 @@ function difference(shot, other, place) {
   return `Δ ${by < 0 ? "−" : "+"}${Math.abs(by).toPrecision(3)}`;
 }
 
-function surfaceName({ equation, condition, inside }) {
+function surfaceName({ equation, condition, comment }) {
   const name = make("span", { className: "surface-name", textContent: equation });
   name.dataset.equation = condition;
   name.onclick = () => chosen(condition);
-  return make("li", {}, name, inside ? "" : " is not in the domain");
+  return make("li", {}, name, comment);
 }
 
 // From the picture to the code and back
