@@ -1,13 +1,14 @@
 """pygls, where it is strict enough, and what is done here in its place. Owns `Protocol` and `StreamServer`.
 
-Taken from pygls: the server and its table of handlers, the way from a message to its handler, answers as futures and
-their cancellation, requests and notifications to the client, the codes of errors; and its client, with which tests talk
-on streams and on a socket. Of pygls 2.1.1 does not hold:
+Taken from pygls: the server and its table of handlers, its synchronous loop, the way from a message to its handler,
+answers as futures and their cancellation, requests and notifications to the client, the codes of errors; and its
+client, with which tests talk on streams and on a socket. Of pygls 2.1.1 does not hold:
 
-- `io_.run` knows `Content-Length: n` in exactly that form, answers nothing to what is not JSON and takes a body that
-  ends early for a message: `StreamServer.carry` is given what `wire.messages` reads.
-- `start_tcp` and `start_ws` put all clients into one conversation, and `start_ws` lets any web page in: `main` takes
-  one client, `websocket` looks at origins.
+- `io_.run` knows `Content-Length: n` in exactly that form and takes a body that ends early for a message: `_Reader`
+  gives it whole bodies under such headers. To what is not JSON it answers nothing: its handler of errors does here.
+- `start_tcp` and `start_ws` run on asyncio's loop, for which what other threads write would have to wait. They put all
+  clients into one conversation, and `start_ws` lets any web page in: `main` takes one client, `websocket` looks at
+  origins.
 - Importing it takes as long as checking a hundred definitions: see `lazy_types` and `later`.
 - `structure_message` is called for every object inside of a message, and makes classes that are taken apart again:
   messages stay plain JSON here.
@@ -17,8 +18,10 @@ on streams and on a socket. Of pygls 2.1.1 does not hold:
 - What a synchronous handler returns is its answer at once, so that it cannot be cancelled: a handler may return a
   future here. `set_result` on a future that was cancelled meanwhile raises: see `settle`.
 - A handler's failure is sent with a traceback, one of the protocol without its data, and both as objects of attrs.
-- `Progress` wants a `LanguageServerProtocol` with its classes, and shows what is over in a moment: see `progress`.
-- `uris` has no path for what is on no disk, and two for a file that a client writes in two ways: see `uris`.
+- `Progress` makes and converts classes of lsprotocol for four notifications, and shows what is over in a moment: see
+  `progress`.
+- `uris` has no path for what is on no disk, two for a file that a client writes in two ways, takes a folder `/C:` for a
+  drive on systems that have none and `file://localhost/` for a share, and raises for a broken address: see `uris`.
 - `_send_data` waits for a client that does not read, writes every message into the log, sends `params: null`, takes
   results apart object by object, and keeps what it cannot send to itself: `wire.Outbox` writes.
 """
@@ -27,23 +30,27 @@ from __future__ import annotations
 
 import logging
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Future, InvalidStateError
 from contextlib import suppress
+from json import JSONDecodeError
+from threading import Event
 from typing import TYPE_CHECKING, Any, cast
 
 from potto_lsp import errors, later
 from potto_lsp.errors import RequestError
-from potto_lsp.wire import BadMessage, framed
+from potto_lsp.wire import framed
 
 later.postpone()
 
-from pygls.protocol import JsonRPCProtocol  # noqa: E402  # what is to wait must be said before
+from pygls.io_ import run  # noqa: E402  # what is to wait must be said before
+from pygls.protocol import JsonRPCProtocol  # noqa: E402
 from pygls.server import JsonRPCServer  # noqa: E402
 
 if TYPE_CHECKING:
     from cattrs import Converter
     from lsprotocol.types import ResponseError
+    from pygls.io_ import Reader
 
 logger = logging.getLogger(__name__)
 Id = int | str
@@ -77,10 +84,7 @@ class Protocol(JsonRPCProtocol):
         return dict
 
     def handle_message(self, message: Any) -> None:
-        if isinstance(message, BadMessage):
-            logger.error("a message that is not JSON: %s", message)
-            self.fail(None, errors.PARSE_ERROR, "this is not JSON")
-        elif not isinstance(message, dict):
+        if not isinstance(message, dict):
             logger.error("a message that is not an object")
             self.fail(None, errors.INVALID_REQUEST, "a message is an object")
         elif not isinstance(method := message.get("method"), str):
@@ -102,7 +106,9 @@ class Protocol(JsonRPCProtocol):
             super()._handle_request(msg_id, method_name, params)
 
     def _handle_notification(self, method_name: str, params: Any) -> None:
-        if method_name == "$/cancelRequest":  # also after `shutdown`: what was asked before it is still waited for
+        if method_name == "exit":  # at any time
+            self._server.leave()
+        elif method_name == "$/cancelRequest":  # also after `shutdown`: what was asked before it is still waited for
             self._handle_cancel_notification(params.get("id") if isinstance(params, Mapping) else None)
         elif not self._server.listens(method_name):
             logger.info("a notification out of time: %s", method_name)
@@ -186,6 +192,29 @@ class Protocol(JsonRPCProtocol):
             self.writer.write(framed({"jsonrpc": self.VERSION, **data}))
 
 
+class _Reader:
+    """Bodies of messages as a stream in the one form that `io_.run` knows."""
+
+    def __init__(self, bodies: Iterator[bytes]) -> None:
+        self._bodies = bodies
+        self._body: bytes | None = None  # whose header was read
+
+    def readline(self) -> bytes:
+        """The header of the next message, then the empty line behind it; nothing at the end."""
+        if self._body is not None:
+            return b"\r\n"
+        self._body = next(self._bodies, None)
+        if self._body is None:
+            return b""
+        self._body = self._body or b" "  # a length of 0 would not count as one
+        return b"Content-Length: %d\r\n" % len(self._body)
+
+    def read(self, length: int) -> bytes | None:
+        """The body whose header was read."""
+        body, self._body = self._body, None
+        return body
+
+
 def _no_converter() -> Converter:
     """What converts messages to classes and back: nothing, they stay plain JSON."""
     return cast("Converter", None)
@@ -198,14 +227,22 @@ class StreamServer(JsonRPCServer, ABC):
 
     def __init__(self) -> None:
         super().__init__(Protocol, _no_converter)
+        self._left = Event()
 
-    def carry(self, messages: Iterable[Any]) -> int:
+    def carry(self, bodies: Iterator[bytes]) -> int:
         """Handle messages until `exit` or their end; the exit status."""
-        for message in messages:
-            if isinstance(message, dict) and message.get("method") == "exit" and "id" not in message:
-                return self.status()
-            self.protocol.handle_message(message)
-        return 1
+        run(self._left, cast("Reader", _Reader(bodies)), self.protocol, logger, self._not_handled)
+        return self.status() if self._left.is_set() else 1
+
+    def leave(self) -> None:
+        """Read no more: the client says `exit`."""
+        self._left.set()
+
+    def _not_handled(self, error: Exception, source: object) -> None:
+        """Something that pygls has logged was wrong with a message, or is with us."""
+        if isinstance(error, JSONDecodeError | UnicodeDecodeError | RecursionError):
+            logger.error("a message that is not JSON: %s", error)
+            self.protocol.fail(None, errors.PARSE_ERROR, "this is not JSON")
 
     @abstractmethod
     def refused(self, method: str) -> RequestError | None:

@@ -5,6 +5,7 @@ Owns `answer` and `greet`.
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from typing import Any
 
@@ -24,15 +25,19 @@ def answer(params: Any) -> dict[str, Any]:
     return {"capabilities": capabilities(Client(params).encoding), "serverInfo": info}
 
 
-def greet(message: Any, outbox: Outbox) -> bool:
-    """Answer the first message at once if it is a proper greeting. Returns whether it was; if not, the server answers
-    it."""
+def greet(body: bytes, outbox: Outbox) -> Any:
+    """Answer the first message at once if it is a proper greeting. Returns its parameters; None if the server is to
+    answer it."""
+    try:
+        message = json.loads(body)
+    except (ValueError, RecursionError):
+        return None
     match message:
-        case {"id": int() | str() as id, "method": "initialize"} if not isinstance(id, bool):
+        case {"id": int() | str() as id, "method": "initialize", "params": params} if not isinstance(id, bool):
             try:
-                result = answer(message.get("params"))
+                result = answer(params)
             except RequestError:
-                return False
+                return None
             outbox.put({"jsonrpc": "2.0", "id": id, "result": result})
-            return True
-    return False
+            return params
+    return None

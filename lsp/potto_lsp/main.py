@@ -11,11 +11,11 @@ import os
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from itertools import chain
-from typing import Any, BinaryIO
+from typing import BinaryIO
 
 from potto_lsp import memory
 from potto_lsp.greeting import greet
-from potto_lsp.wire import Outbox, arrivals, messages
+from potto_lsp.wire import Outbox, arrivals, bodies
 
 SWITCH = 0.0002  # seconds; with Python's default of 5 ms, so long would a question wait for a busy thread
 
@@ -56,10 +56,10 @@ def _serve_streams() -> int:
 
 def _talk(reader: BinaryIO, writer: BinaryIO) -> int:
     """Serve the client at a pair of streams and return the exit status."""
-    return _converse(messages(reader), Outbox(writer), arrivals(reader))
+    return _converse(bodies(reader), Outbox(writer), arrivals(reader))
 
 
-def _converse(received: Iterator[Any], outbox: Outbox, arrived: Callable[[], bool] = lambda: False) -> int:
+def _converse(received: Iterator[bytes], outbox: Outbox, arrived: Callable[[], bool] = lambda: False) -> int:
     """Serve a client and return the exit status. The greeting is answered before the server is loaded."""
     first = next(received, None)
     if first is None:
@@ -70,7 +70,7 @@ def _converse(received: Iterator[Any], outbox: Outbox, arrived: Callable[[], boo
 
         from potto_lsp.server import Server
 
-    return Server(chain([first], received), outbox, greeted, arrived).run()
+    return Server(received if greeted else chain([first], received), outbox, greeted, arrived).run()
 
 
 def take_streams() -> tuple[BinaryIO, BinaryIO]:

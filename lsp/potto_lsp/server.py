@@ -10,7 +10,7 @@ from __future__ import annotations
 import itertools
 import logging
 import os
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 from functools import partial
 from typing import Any
@@ -43,18 +43,18 @@ def leave() -> None:
 class Server(StreamServer):
     """One client: the messages that it sends, and where answers go.
 
-    `greeted`: the first message was a greeting, and has been answered. `arrived` says whether bytes wait to be read.
+    `greeted`: the parameters of a greeting that has been answered. `arrived` says whether bytes wait to be read.
     """
 
     def __init__(
         self,
-        messages: Iterable[Any],
+        bodies: Iterator[bytes],
         outbox: Outbox,
-        greeted: bool = False,
+        greeted: Any = None,
         arrived: Callable[[], bool] = lambda: False,
     ) -> None:
         super().__init__()
-        self._messages, self._outbox, self._greeted, self._arrived = messages, outbox, greeted, arrived
+        self._bodies, self._outbox, self._greeted, self._arrived = bodies, outbox, greeted, arrived
         self.protocol.set_writer(outbox)
         self.documents = Documents()
         self.session: ClientSession | None = None
@@ -71,10 +71,9 @@ class Server(StreamServer):
 
     def run(self) -> int:
         """Talk until the client leaves. Returns the exit status."""
-        received = iter(self._messages)
-        if self._greeted:
-            self._initialize(next(received).get("params"))
-        status = self.carry(received)
+        if self._greeted is not None:
+            self._initialize(self._greeted)
+        status = self.carry(self._bodies)
         if self.session is not None:
             self.session.close()
         self._outbox.close()

@@ -11,13 +11,13 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from queue import SimpleQueue
 from threading import Lock, Thread
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from websockets.exceptions import ConnectionClosed
 from websockets.sync import server
 from websockets.typing import Origin
 
-from potto_lsp.wire import MOST_BYTES, Outbox, parsed
+from potto_lsp.wire import MOST_BYTES, Outbox
 
 if TYPE_CHECKING:
     from websockets.sync.server import ServerConnection
@@ -26,7 +26,7 @@ logger = logging.getLogger(__name__)
 SECONDS_TO_CLOSE = 1.0
 TRY_AGAIN_LATER = 1013  # a code of RFC 6455's registry
 FAILED = 70
-Talk = Callable[[Iterator[Any], Outbox], int]
+Talk = Callable[[Iterator[bytes], Outbox], int]
 
 
 def serve(address: tuple[str, int], origins: Sequence[str], talk: Talk) -> int:
@@ -41,7 +41,7 @@ def serve(address: tuple[str, int], origins: Sequence[str], talk: Talk) -> int:
             return
         status = FAILED
         try:
-            status = talk(_messages(connection), Outbox(_Frames(connection)))
+            status = talk(_bodies(connection), Outbox(_Frames(connection)))
         finally:
             ended.put(status)
 
@@ -55,10 +55,10 @@ def serve(address: tuple[str, int], origins: Sequence[str], talk: Talk) -> int:
         return ended.get()
 
 
-def _messages(connection: ServerConnection) -> Iterator[Any]:
+def _bodies(connection: ServerConnection) -> Iterator[bytes]:
     try:
         for body in connection:
-            yield parsed(body)
+            yield body.encode() if isinstance(body, str) else body
     except ConnectionClosed as error:
         logger.info("the client is gone: %s", error)
 

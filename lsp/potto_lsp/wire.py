@@ -1,8 +1,8 @@
 """Messages on a stream: `Content-Length` and JSON, as in the base protocol.
 
-Owns `messages`, which reads them, `parsed`, which reads the body of one, `arrivals`, which says whether bytes wait,
-`framed`, which makes a message's bytes, and `Outbox`, which writes them from any thread without waiting: if the server
-stopped reading because a client does not read for a while, both would wait forever.
+Owns `bodies`, which reads them, `arrivals`, which says whether bytes wait, `framed`, which makes a message's bytes, and
+`Outbox`, which writes them from any thread without waiting: if the server stopped reading because a client does not
+read for a while, both would wait forever.
 """
 
 from __future__ import annotations
@@ -22,33 +22,21 @@ MOST_BYTES = 256_000_000  # of one message; a header that says more is broken
 _OF_A_BROWSER = re.compile(rb"[A-Z]+ \S+ HTTP/")
 
 
-class BadMessage(ValueError):
-    """A body that is not JSON."""
-
-
-def messages(stream: BinaryIO) -> Iterator[Any]:
-    """The messages of a stream until it ends or breaks; for a body that is not JSON, a `BadMessage`."""
+def bodies(stream: BinaryIO) -> Iterator[bytes]:
+    """The messages of a stream, each whole, until it ends or breaks."""
     try:
-        yield from _messages(stream)
+        yield from _bodies(stream)
     except OSError as error:
         logger.info("the client is gone: %s", error)
 
 
-def _messages(stream: BinaryIO) -> Iterator[Any]:
+def _bodies(stream: BinaryIO) -> Iterator[bytes]:
     while (length := _header(stream)) is not None:
         body = stream.read(length)
         if len(body) < length:
             logger.error("the stream ended inside of a message")
             return
-        yield parsed(body)
-
-
-def parsed(body: bytes | str) -> Any:
-    """The message that a body is; a `BadMessage` if it is not JSON."""
-    try:
-        return json.loads(body)
-    except (ValueError, RecursionError) as error:
-        return BadMessage(f"{type(error).__name__}: {error}")
+        yield body
 
 
 def arrivals(stream: BinaryIO) -> Callable[[], bool]:

@@ -91,7 +91,7 @@ def test_nothing_is_lost_at_the_end() -> None:
 
 def test_who_writes_never_waits_for_a_client_that_does_not_read() -> None:
     """What the pipe takes is written at once, the rest when it is read, all of it in order."""
-    from potto_lsp.wire import Outbox, messages
+    from potto_lsp.wire import Outbox, bodies
 
     out, into = os.pipe()
     with os.fdopen(out, "rb") as reader, os.fdopen(into, "wb") as writer:
@@ -100,7 +100,7 @@ def test_who_writes_never_waits_for_a_client_that_does_not_read() -> None:
         assert select.select([reader], [], [], 0)[0], "a short message is there before `put` is over"
         for number in range(1, 60):
             outbox.put({"id": number, "result": "x" * 5000})  # four times what a pipe holds
-        read = messages(reader)
+        read = map(json.loads, bodies(reader))
         assert [next(read)["id"] for _ in range(60)] == list(range(60))
         outbox.put({"id": 60})
         assert next(read)["id"] == 60

@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 from potto_lsp import server
 from potto_lsp.features import Feature
-from potto_lsp.wire import Outbox, messages
+from potto_lsp.wire import Outbox, bodies
 
 from potto.checking import check
 
@@ -28,7 +28,7 @@ class Pipe:
     def __init__(self) -> None:
         (inner, outer), (answers, writer) = os.pipe(), os.pipe()
         self.out, self.answers = os.fdopen(outer, "wb", buffering=0), os.fdopen(answers, "rb")
-        self.server = server.Server(messages(os.fdopen(inner, "rb")), Outbox(os.fdopen(writer, "wb")))
+        self.server = server.Server(bodies(os.fdopen(inner, "rb")), Outbox(os.fdopen(writer, "wb")))
         self.thread = threading.Thread(target=self.server.run)
         self.thread.start()
         self.notes: list[dict[str, Any]] = []
@@ -168,18 +168,16 @@ def test_a_client_that_does_not_read_does_not_stop_the_server() -> None:
 
 
 def test_messages_that_end_too_early() -> None:
-    from potto_lsp.wire import messages
-
-    assert list(messages(io.BytesIO(b"Content-Length: 10\r\n\r\n{}"))) == []
-    assert list(messages(io.BytesIO(b"nonsense\r\n\r\nContent-Length: x\r\n\r\nContent-Length: 2\r\n\r\n{}"))) == [{}]
-    assert list(messages(io.BytesIO(b"Content-Length: 99999999999999\r\n\r\n"))) == []
+    assert list(bodies(io.BytesIO(b"Content-Length: 10\r\n\r\n{}"))) == []
+    assert list(bodies(io.BytesIO(b"nonsense\r\n\r\nContent-Length: x\r\n\r\nContent-Length: 2\r\n\r\n{}"))) == [b"{}"]
+    assert list(bodies(io.BytesIO(b"Content-Length: 99999999999999\r\n\r\n"))) == []
 
 
 @pytest.mark.parametrize("first", [b"POST / HTTP/1.1", b"GET /chat HTTP/1.1"])
 def test_a_web_page_cannot_speak_to_the_server(first: bytes) -> None:
     request = first + b"\r\nHost: localhost:7\r\nOrigin: https://elsewhere\r\nContent-Length: 2\r\n\r\n{}"
-    assert list(messages(io.BytesIO(request))) == []
-    assert list(messages(io.BytesIO(b"Content-Length: 2\r\n\r\n{}" + request))) == [{}]
+    assert list(bodies(io.BytesIO(request))) == []
+    assert list(bodies(io.BytesIO(b"Content-Length: 2\r\n\r\n{}" + request))) == [b"{}"]
 
 
 def test_a_server_that_cannot_start_its_analysis_ends() -> None:
