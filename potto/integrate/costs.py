@@ -121,12 +121,12 @@ class Costs(Struct):
             seen.met = seen.met or bool(np.any(inside))
             seen.moves = seen.moves or any(s is not None and bool(np.any(inside & (s != 0))) for s in speeds)
 
-    def sampled(self, surface: Term, inside: Any, speeds: Sequence[Any]) -> None:
-        """The same of a surface that was sampled."""
+    def sampled(self, surface: Term, speeds: Any) -> None:
+        """The same of a surface that was met at samples, by its speeds there."""
         seen = self.surfaces.setdefault(surface, SurfaceCount())
         seen.asked = True
-        seen.met = seen.met or bool(np.any(inside))
-        seen.moves = seen.moves or any(bool(np.any(inside & (s != 0))) for s in speeds)
+        seen.met = True
+        seen.moves = seen.moves or bool(np.any(speeds))
 
     def rename(self, known: frozenset[Term], change: Callable[[Term], Term]) -> None:
         """Give other terms to the surfaces that were met beyond those known; those that become the same are one."""

@@ -59,6 +59,8 @@ def at_points(kernel: Kernel, rt: Runtime, trace: Trace | None, args: list[Value
     function = found.promotion.function(backend, found.text)
     if function is not None:
         return found.run(function, rt, sides, args)
+    if found.everywhere is not None:
+        return found.everywhere(rt, sides, args)
     with found.promotion.by_numpy():
         return in_chunks(kernel, rt, trace, args, [*compress(parts, varying)])
 

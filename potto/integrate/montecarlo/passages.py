@@ -5,6 +5,7 @@ Owns `Passage`.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
@@ -32,7 +33,7 @@ class Passage(Struct, dict=True):
     number: int
 
     def through(
-        self, labels: list[Array | None], pivot: int, slope: Array, speed: Number | None, asked: Bools
+        self, labels: Sequence[Array | None], pivot: int, slope: Array, speed: Number | None, asked: Bools
     ) -> Bools:
         """Whether phi goes through 0, the way its slope says, at points along the pivot: (n,), of those asked for.
 
@@ -52,7 +53,7 @@ class Passage(Struct, dict=True):
         found[rows] = self.changes(labels, pivot, way, rows)
         return found
 
-    def changes(self, labels: list[Array | None], pivot: int, way: Array, rows: Ints) -> Bools:
+    def changes(self, labels: Sequence[Array | None], pivot: int, way: Array, rows: Ints) -> Bools:
         """Whether phi changes its sign at some of the points, that way."""
         found, left = np.zeros(rows.size, dtype=bool), np.arange(rows.size)
         for step in PASSING:
@@ -64,7 +65,7 @@ class Passage(Struct, dict=True):
             left = left[(above * below >= 0) & ~found[left]]
         return found
 
-    def sign(self, labels: list[Array | None], pivot: int, side: float) -> Array:
+    def sign(self, labels: Sequence[Array | None], pivot: int, side: float) -> Array:
         """The sign of phi so far along the pivot from points, 0 where rounding hides it: (n,)."""
         u = labels[pivot]
         assert u is not None

@@ -92,6 +92,7 @@ class Replicates:
             return
         n = sum(u.shape[1] for u, _ in blocks)
         values = {name: [self._apart(getattr(s, name)) for _, s in blocks] for name in self.steps}
+        values = {name: parts for name, parts in values.items() if any(part.any() for part in parts)}
         largest = {name: np.zeros(parts[0].shape[:-2]) for name, parts in values.items()}
         for row in range(self.count):  # one after the other: of all there are more than a cache holds
             places = np.concatenate([u[row] for u, _ in blocks])

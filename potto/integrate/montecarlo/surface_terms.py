@@ -17,7 +17,7 @@ is the boundary term, with bounded weights.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from functools import cached_property
 from itertools import zip_longest
@@ -40,7 +40,7 @@ from potto.integrate.montecarlo.pivot_choice import pivots
 from potto.integrate.pieces import Evaluator, Sums, number_at, still
 from potto.integrate.plan import Plan
 from potto.integrate.rules.gauss import EPS
-from potto.kernels.cells import Array, Bools, Cell, Mask, Value, pad
+from potto.kernels.cells import Array, Cell, Ints, Mask, Value, pad
 
 # A root that phi's own slope puts further away than this (in labels) is not one that phi passes through smoothly.
 OFF = 1e-6
@@ -152,11 +152,13 @@ class Surface(Struct, dict=True):
             for other in seen:
                 inside &= root != other
             seen.append(root)
-            if inside.any():
-                labels[pivot] = np.where(inside, label_of(lo, hi, root), 0.5)
-                off = np.where(inside, (0.0 if row.e is None else row.e) + PLACED * _reach(lo, hi, root), 0.0)
-                more, error = self.at(labels, pivot, inside, off, term)
-                t, et = t + more, et + error
+            rows = np.flatnonzero(inside)
+            if rows.size:
+                label = as_array(label_of(lo, hi, root), n)
+                off = (0.0 if row.e is None else row.e) + PLACED * _reach(lo, hi, root)
+                here = [label if u is None else u for u in labels]
+                found = self.at([u[rows] for u in here], pivot, as_array(off, n)[rows], term)
+                t, et = (_with(whole, rows, part) for whole, part in zip((t, et), found, strict=True))
         if weight is not None:
             t, et = t * weight, et * weight
         return Sums(nothing.v, nothing.e, t, et)
@@ -192,9 +194,7 @@ class Surface(Struct, dict=True):
         lo, hi, rows = frame_rows(along.plan, machine.tracking(), point.env)
         return lo, hi, rows + searched_rows(along.plan, point.env, lo, hi, n, machine, summed=True), weight
 
-    def at(
-        self, labels: list[Array | None], pivot: int, inside: Bools, off: Array, root: Term | None
-    ) -> tuple[Array, Array]:
+    def at(self, labels: list[Array], pivot: int, off: Array, root: Term | None) -> tuple[Array, Array]:
         """[F] phi_theta |phi_j|/|grad phi|^2 at points of the surface, and its error: (m, k, n) each.
 
         off: how far from the surface the points may be, by rounding. root: the pivot there, where it has a closed form.
@@ -213,17 +213,17 @@ class Surface(Struct, dict=True):
             if self.passage is not None:  # at a pole its slope has the sign of neither side, where it touches of one
                 along = point.env[self.chart.plan.levels[pivot].variable]
                 assert isinstance(along, Cell)
-                smooth &= self.passage.through(labels, pivot, slopes[j], along.t[j], inside & smooth)
-        odd = inside & ~smooth
+                smooth &= self.passage.through(labels, pivot, slopes[j], along.t[j], smooth)
+        odd = ~smooth
         if odd.any():
             rates = np.where(odd, self.beside(labels, pivot, marked, point, root), rates)
-        unknown = inside & np.isnan(rates).any(axis=0)
+        unknown = np.isnan(rates).any(axis=0)
         if unknown.any():
             self.machine.note(UNKNOWN_JUMP)
-        counts = inside & (rates != 0).any(axis=0)
+        counts = (rates != 0).any(axis=0)
         costs = self.machine.costs
         if costs is not None:
-            costs.sampled(self.term, inside, rates)
+            costs.sampled(self.term, rates)
         if not counts.any():  # nothing that is differentiated moves it here
             return np.zeros((1, k, n)), np.zeros((1, k, n))
         if self.chart.plan.hides:
@@ -256,7 +256,7 @@ class Surface(Struct, dict=True):
             below = self.integrand(frozen, {g: np.logical_not(side) for g, side in sides.items()}, n)
         return above, below
 
-    def off_the_surface(self, labels: list[Array | None], pivot: int, n: int) -> tuple[Sums, Sums]:
+    def off_the_surface(self, labels: Sequence[Array | None], pivot: int, n: int) -> tuple[Sums, Sums]:
         """The same where some sides can't be forced: from points so close to the surface that they fall on its sides.
 
         Two on each side tell by how much the integrand changes on the way to it.
@@ -282,7 +282,7 @@ class Surface(Struct, dict=True):
         )
         return above, below
 
-    def placed(self, labels: list[Array | None], pivot: int, marked: dict[int, int], n: int) -> Point:
+    def placed(self, labels: Sequence[Array | None], pivot: int, marked: dict[int, int], n: int) -> Point:
         """Points with every variable at its label, those of the axes moving. Cuts along the pivot's way are not known
         before it is; labels further out are crowded already (`roots`), those further in are here."""
         wide = self.machine.directions + len(marked)
@@ -298,7 +298,7 @@ class Surface(Struct, dict=True):
         return sides
 
     def beside(
-        self, labels: list[Array | None], pivot: int, marked: dict[int, int], point: Point, root: Term | None
+        self, labels: Sequence[Array | None], pivot: int, marked: dict[int, int], point: Point, root: Term | None
     ) -> Array:
         """The same where phi has a pole, a kink, a jump or no slope: nothing if its sign does not change.
 
@@ -326,7 +326,7 @@ class Surface(Struct, dict=True):
         rates = np.where(far, np.nan, np.where(np.isfinite(rates), rates, 0.0))
         return np.where(change == 0, 0.0, rates * change)
 
-    def around(self, labels: list[Array | None], pivot: int, marked: dict[int, int]) -> tuple[Array, Array, Array]:
+    def around(self, labels: Sequence[Array | None], pivot: int, marked: dict[int, int]) -> tuple[Array, Array, Array]:
         """phi just below and just above points along the pivot, and its tangents just above."""
         u = labels[pivot]
         assert u is not None
@@ -342,7 +342,7 @@ class Surface(Struct, dict=True):
         planar = plane(self.term, [level.variable for level in self.chart.plan.levels])
         return None if planar else Passage(self.chart, self.term, self.number)
 
-    def labelled(self, labels: list[Array | None], pivot: int, marked: dict[int, int]) -> dict[str, Value]:
+    def labelled(self, labels: Sequence[Array | None], pivot: int, marked: dict[int, int]) -> dict[str, Value]:
         """What roots along the pivot are written in where bounds follow it."""
         wide = self.machine.directions + len(marked)
         env: dict[str, Value] = {}
@@ -364,6 +364,14 @@ class Surface(Struct, dict=True):
         value = number_at(function, self.machine.with_directions(wide), env)
         t = np.broadcast_arrays(*(0.0 if x is None else x for x in value.t or (None,) * wide))
         return as_array(value.v, n), np.stack(t).reshape(wide, -1)
+
+
+def _with(whole: Array, rows: Ints, part: Array) -> Array:
+    """Rows (m, k, n) with what some of them bring added, which may have more components."""
+    if len(whole) < len(part):
+        whole = np.repeat(whole, len(part), axis=0)
+    whole[..., rows] += part
+    return whole
 
 
 def _reach(lo: Cell, hi: Cell, x: Array) -> Array:

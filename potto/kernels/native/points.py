@@ -50,6 +50,7 @@ class Pointwise:
         self.varying = found.union(ArgumentPart((at,), SIDE) for at, varies in forced if varies)
         self.promotion = Promotion(NAME, _least_lines(kernel, forced))
         self.around: Callable[..., Value] | None = None
+        self.everywhere: Callable[..., Value] | None = None  # the value, of (rt, trace, args), where it is one number
 
     def text(self) -> str:
         """The function. Raises NotStraight."""
@@ -64,9 +65,12 @@ class Pointwise:
         wanted = read(operations, names)
         given = tuple(name for name in wanted if name in constant)
         arrays = tuple(name for name in wanted if name not in constant)
-        if not arrays:
-            raise NotStraight("the same at all points")
         outputs = tuple(name for name in names if name in made)
+        if not arrays:
+            if not outputs:  # all that varies decides sides that are forced
+                result = _unpacked(straight.result, dict.fromkeys(given))
+                self.everywhere = straight.function(constant, given, "rt, sides, args", [f"return {result}"], SCOPE)
+            raise NotStraight("the same at all points")
         self.around = straight.function(
             constant, (*given, *arrays), "rt, sides, args, call",
             _around(given, arrays, outputs, _unpacked(straight.result, {**dict.fromkeys((*given, *arrays)), **{
