@@ -36,6 +36,7 @@ from potto.syntax.nodes import (
     Expr,
     If,
     InlineDiffeo,
+    Integral,
     Lambda,
     Let,
     ListLiteral,
@@ -162,6 +163,9 @@ def paren_comma(_: Context, v: Values) -> Parenthesized:
 
 def application(context: Context, v: Values) -> Expr:
     function, value = as_expr(context, v[0]), v[1]
+    if isinstance(v[0], Integral) and isinstance(value, Name) and value.id == "d":
+        message = "an integral ends with one `d(...)`, which names all of its variables"
+        context.report(kinds.OTHER_LANGUAGE(value.span, message, help="write `d(x, y)` for `d(x) d(y)`"))
     if isinstance(value, Suffixed):
         return suffixed(application(context, [function, value.group]), value.suffixes)
     if isinstance(value, Parenthesized):

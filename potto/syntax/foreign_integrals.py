@@ -66,9 +66,11 @@ def _rewritten(word: Token, bounds: tuple[_Bound, ...], end: int, found: Sequenc
     if open_end and open_end[0] >= end:
         edits.append(Replacement(Span(open_end[0], open_end[0]), closing))
     named = all(bound.variable for bound in bounds)
+    order = "the bounds of an integral come first, in brackets, and its variables last"
+    grouped = "the bounds of several variables stand in parentheses, with commas between them"
     return kinds.OTHER_LANGUAGE(
         Span(word.start, end),
-        "the bounds of an integral come first, in brackets, and its variables last",
+        order if any(bound.variable for bound in bounds) or len(bounds) == 1 else grouped,
         help=f"write `{word.text} {first} …{closing}`",
         suggestions=(Suggestion(f"Write `{word.text} {first} …{closing}`", tuple(edits)),) if named else (),
     )
@@ -93,7 +95,7 @@ def _head(text: str, tokens: Sequence[Token]) -> _Head | None:
 
 
 def _several(text: str, tokens: Sequence[Token]) -> _Head | None:
-    """Bounds with commas between them."""
+    """Bounds with commas between them, or side by side."""
     bounds: list[_Bound] = []
     at, foreign = 0, False
     while True:
@@ -103,9 +105,19 @@ def _several(text: str, tokens: Sequence[Token]) -> _Head | None:
         bounds += one.bounds
         foreign = foreign or one.foreign
         at += one.size
-        if at + 1 >= len(tokens) or tokens[at].kind != "COMMA":
+        if at + 1 < len(tokens) and tokens[at].kind == "COMMA":
+            at += 1
+        elif _is_bound(tokens[at:]):
+            foreign = True
+        else:
             return _Head(tuple(bounds), at, foreign)
-        at += 1
+
+
+def _is_bound(tokens: Sequence[Token]) -> bool:
+    """Whether `[c, d]` behind `[a, b]` is a second bound, and no array: what is integrated comes behind it."""
+    size = _operand(tokens) if tokens and tokens[0].text == "[" else 0
+    behind = tokens[size].kind if 0 < size < len(tokens) else ""
+    return _commas(tokens[1 : size - 1]) == 1 and (behind in ("NAME", "NUMBER") or behind in _OPENING)
 
 
 def _one(text: str, tokens: Sequence[Token]) -> _Head | None:
@@ -123,7 +135,7 @@ def _one(text: str, tokens: Sequence[Token]) -> _Head | None:
         elif tokens[1].kind != "FROM":
             return None
     start = at + 1 if at < len(tokens) and tokens[at].kind == "FROM" else at
-    if start == at and at < len(tokens) and tokens[at].kind == "LSQB":
+    if start == at and at < len(tokens) and tokens[at].text == "[":
         size = _operand(tokens[at:])
         inside = tokens[at + 1 : at + size - 1]
         if not size or _commas(inside) != 1:

@@ -69,7 +69,12 @@ def test_mathematics() -> None:
         def f(t) integral x ~ normal(0, 1) [x < t]
         #        ^^^^^^^^^^^^^^^^^^^^^^^^^ error[P0117]: the bounds of an integral come first
         def f(t) integral [0, 1], [0, t] x*y d(x, y)
-        #        ^^^^^^^^^^^^^^^^^^^^^^^ error[P0117]: the bounds of an integral come first
+        #        ^^^^^^^^^^^^^^^^^^^^^^^ error[P0117]: the bounds of several variables stand in parentheses
+        def f(t) integral [0, 1] [0, t] x*y d(x) d(y)
+        #        ^^^^^^^^^^^^^^^^^^^^^^ error[P0117]: the bounds of several variables stand in parentheses
+        def f(t) integral [0, t] x*t d(x) d(t)
+        #                                 ^ error[P0117]: an integral ends with one `d(...)`, which names all
+        def f(t) integral [0, 1] [x, t*x] d(x)
         def f(t) integral([0, t], 2*x, x)
         #        ^^^^^^^^ error[P0117]: an integral is not a call
         def f(m) integral (normal(m, 1)) [x > 0] d(x)

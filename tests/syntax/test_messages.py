@@ -196,7 +196,7 @@ def test_bounds() -> None:
 @pytest.mark.parametrize("body", ["x*y", "(x*y)", "[x + y < 1]"])
 def test_bounds_beside_each_other(body: str) -> None:
     ((found, _),) = messages(f"a = integral [0, 1] [0, 1] {body} d(x, y)")
-    assert found.code == "P0109" and "those of several stand in parentheses" in (found.help or "")
+    assert found.code == "P0117" and found.help == "write `integral ([0, 1], [0, 1]) … d(x, y)`"
 
 
 def test_duplicates() -> None:
