@@ -45,8 +45,8 @@ lint: $(STAMP)  ## lints, types
 check: lint  ## lints, types, floors
 	$(BIN)/python -m pytest tests/test_architecture.py
 
-tables: $(STAMP)  ## potto/syntax/tables.json: what the parser reads, of the grammar as it is now
-	$(BIN)/python -c 'from potto.syntax.tables import write; write()'
+tables: $(STAMP)  ## potto/syntax/parse_tables.json: what the parser reads, of the grammar as it is now
+	$(BIN)/python -c 'from potto.syntax.parse_tables import write; write()'
 
 docs: $(STAMP)  ## the pages as a site in build/site: links and anchors checked, their programs run
 	$(BIN)/python -c 'import material' 2>/dev/null || $(BIN)/python -m pip install -qq --disable-pip-version-check -e '.[docs]'

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from lsp_workspace import longer, resigned, workspace
-from potto_lsp import memory
+from potto_lsp import collector
 from potto_lsp.analysis import Analysis
 from potto_lsp.client import Client
 from potto_lsp.documents import Document
@@ -41,7 +41,7 @@ class Session:
         self.check(set())
         self.analysis.settled = True
         self.analysis.forget_trees()
-        memory.begin_collecting()
+        collector.begin_collecting()
 
     def put(self, name: str, text: str) -> None:
         self.version += 1
@@ -70,7 +70,7 @@ class Session:
         start = time.thread_time()
         self.put(name, text)
         told, done = self.check(wanted), time.thread_time()
-        memory.tidy()  # as the server does while nobody waits
+        collector.tidy()  # as the server does while nobody waits
         return (told - start) * 1e3, (done - start) * 1e3
 
 

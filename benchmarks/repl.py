@@ -170,8 +170,8 @@ def keystrokes() -> dict[str, Figure]:
     from potto_repl.complete import candidates
     from potto_repl.editing import is_over
     from potto_repl.highlight import PottoLexer
-    from potto_repl.loading import Loader
     from potto_repl.respond import respond
+    from potto_repl.session_loading import Loader
     from prompt_toolkit.document import Document
 
     from potto.projects.settings import DEFAULTS

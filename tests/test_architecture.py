@@ -43,7 +43,7 @@ OUTSIDERS: dict[str, tuple[str, ...]] = {
         "potto.python.accepting",
         "potto.python.arguments",
         "potto.python.arrays",
-        "potto.python.forms",
+        "potto.python.derivative_forms",
         "potto.python.hessian",
         "potto.python.derived_calls",
         "potto.python.sided",

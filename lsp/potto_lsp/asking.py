@@ -14,7 +14,7 @@ from msgspec import Struct
 
 from potto.source import Span
 from potto_lsp import convert, protocol
-from potto_lsp.errors import InvalidParams
+from potto_lsp.failures import InvalidParams
 from potto_lsp.uris import to_key
 
 if TYPE_CHECKING:

@@ -4,7 +4,7 @@ Taken from pygls: the server and its table of handlers, its synchronous loop, th
 answers as futures and their cancellation, requests and notifications to the client, the codes of errors; and its
 client, with which tests talk on streams and on a socket. Of pygls 2.1.1 does not hold:
 
-- `io_.run` knows `Content-Length: n` in exactly that form and takes a body that ends early for a message: `_Reader`
+- `io_.run` knows `Content-Length: n` in exactly that form and takes a body that ends early for a message: `_Bodies`
   gives it whole bodies under such headers. To what is not JSON it answers nothing: its handler of errors does here.
 - `start_tcp` and `start_ws` run on asyncio's loop, for which what other threads write would have to wait. They put all
   clients into one conversation, and `start_ws` lets any web page in: `main` takes one client, `websocket` looks at
@@ -37,8 +37,8 @@ from json import JSONDecodeError
 from threading import Event
 from typing import TYPE_CHECKING, Any, cast
 
-from potto_lsp import errors, later
-from potto_lsp.errors import RequestError
+from potto_lsp import failures, later
+from potto_lsp.failures import RequestError
 from potto_lsp.wire import framed
 
 later.postpone()
@@ -86,7 +86,7 @@ class Protocol(JsonRPCProtocol):
     def handle_message(self, message: Any) -> None:
         if not isinstance(message, dict):
             logger.error("a message that is not an object")
-            self.fail(None, errors.INVALID_REQUEST, "a message is an object")
+            self.fail(None, failures.INVALID_REQUEST, "a message is an object")
         elif not isinstance(method := message.get("method"), str):
             self._handle_response(cast(Id, message.get("id")), message.get("result"), message.get("error"))
         elif "id" not in message:
@@ -94,14 +94,14 @@ class Protocol(JsonRPCProtocol):
         elif isinstance(id := message["id"], int | str) and not isinstance(id, bool):
             self._handle_request(id, method, message.get("params"))
         else:
-            self.fail(None, errors.INVALID_REQUEST, "the id of a request is a number or a string")
+            self.fail(None, failures.INVALID_REQUEST, "the id of a request is a number or a string")
 
     def _handle_request(self, msg_id: Id, method_name: str, params: Any) -> None:
         refused = self._server.refused(method_name)
         if refused is not None:
             self.fail(msg_id, refused.code, refused.message)
         elif method_name not in self.fm.features:
-            self.fail(msg_id, errors.METHOD_NOT_FOUND, f"there is no method `{method_name}`")
+            self.fail(msg_id, failures.METHOD_NOT_FOUND, f"there is no method `{method_name}`")
         else:
             super()._handle_request(msg_id, method_name, params)
 
@@ -125,7 +125,7 @@ class Protocol(JsonRPCProtocol):
             settle(future, result)
         else:
             said = error if isinstance(error, Mapping) else {}
-            code = said.get("code", errors.INTERNAL_ERROR)
+            code = said.get("code", failures.INTERNAL_ERROR)
             settle(future, error=RequestError(code, str(said.get("message", "")), said.get("data")))
 
     def _handle_cancel_notification(self, msg_id: Any) -> None:
@@ -161,7 +161,7 @@ class Protocol(JsonRPCProtocol):
         if self._asked.get(msg_id) is future:
             del self._asked[msg_id]
         if future.cancelled():
-            self.fail(msg_id, errors.REQUEST_CANCELLED, "the request was cancelled")
+            self.fail(msg_id, failures.REQUEST_CANCELLED, "the request was cancelled")
             return
         match future.exception():
             case None:
@@ -170,7 +170,7 @@ class Protocol(JsonRPCProtocol):
                 self.fail(msg_id, error.code, error.message, error.data)
             case error:
                 logger.error("a request failed", exc_info=error)
-                self.fail(msg_id, errors.INTERNAL_ERROR, f"internal error: {type(error).__name__}: {error}")
+                self.fail(msg_id, failures.INTERNAL_ERROR, f"internal error: {type(error).__name__}: {error}")
 
     # Sending
 
@@ -192,7 +192,7 @@ class Protocol(JsonRPCProtocol):
             self.writer.write(framed({"jsonrpc": self.VERSION, **data}))
 
 
-class _Reader:
+class _Bodies:
     """Bodies of messages as a stream in the one form that `io_.run` knows."""
 
     def __init__(self, bodies: Iterator[bytes]) -> None:
@@ -231,7 +231,7 @@ class StreamServer(JsonRPCServer, ABC):
 
     def carry(self, bodies: Iterator[bytes]) -> int:
         """Handle messages until `exit` or their end; the exit status."""
-        run(self._left, cast("Reader", _Reader(bodies)), self.protocol, logger, self._not_handled)
+        run(self._left, cast("Reader", _Bodies(bodies)), self.protocol, logger, self._not_handled)
         return self.status() if self._left.is_set() else 1
 
     def leave(self) -> None:
@@ -242,7 +242,7 @@ class StreamServer(JsonRPCServer, ABC):
         """Something that pygls has logged was wrong with a message, or is with us."""
         if isinstance(error, JSONDecodeError | UnicodeDecodeError | RecursionError):
             logger.error("a message that is not JSON: %s", error)
-            self.protocol.fail(None, errors.PARSE_ERROR, "this is not JSON")
+            self.protocol.fail(None, failures.PARSE_ERROR, "this is not JSON")
 
     @abstractmethod
     def refused(self, method: str) -> RequestError | None:

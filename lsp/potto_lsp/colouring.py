@@ -13,7 +13,7 @@ from msgspec import Struct
 from potto_lsp.wire import Encoded
 
 
-class Words(Struct, frozen=True, dict=True):
+class TokenNumbers(Struct, frozen=True, dict=True):
     """The words of a piece as numbers: the line of the last one, and five for each, every word placed relative to the
     one before it. So they are the same wherever the piece stands, but for the first number."""
 
@@ -31,7 +31,7 @@ class Colours(Struct, frozen=True):
     before."""
 
     id: str
-    parts: list[Words]
+    parts: list[TokenNumbers]
     below: list[int]
 
     def sent(self) -> Encoded:

@@ -7,7 +7,7 @@ from typing import Any
 
 from msgspec import Struct
 
-from potto_lsp.errors import RequestError
+from potto_lsp.failures import RequestError
 
 
 class Deferred(Struct, frozen=True):

@@ -11,7 +11,7 @@ from typing import Any
 
 from msgspec import Struct
 
-from potto_lsp.errors import InvalidParams
+from potto_lsp.failures import InvalidParams
 from potto_lsp.text import DocumentText, Encoding
 
 logger = logging.getLogger(__name__)

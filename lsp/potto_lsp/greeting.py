@@ -10,9 +10,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from potto import __version__
-from potto_lsp import errors
+from potto_lsp import failures
 from potto_lsp.client import Client
-from potto_lsp.errors import RequestError
+from potto_lsp.failures import RequestError
 from potto_lsp.features import capabilities
 from potto_lsp.wire import Outbox
 
@@ -20,7 +20,7 @@ from potto_lsp.wire import Outbox
 def answer(params: Any) -> dict[str, Any]:
     """What the server can do, for a client. Raises `RequestError` if `params` are not a greeting."""
     if not isinstance(params, Mapping) or not isinstance(params.get("capabilities", {}), Mapping):
-        raise RequestError(errors.INVALID_PARAMS, "the client's capabilities are missing")
+        raise RequestError(failures.INVALID_PARAMS, "the client's capabilities are missing")
     info = {"name": "potto", "version": __version__}
     return {"capabilities": capabilities(Client(params).encoding), "serverInfo": info}
 

@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator, Sequence
 from itertools import chain
 from typing import BinaryIO
 
-from potto_lsp import memory
+from potto_lsp import collector
 from potto_lsp.greeting import greet
 from potto_lsp.wire import Outbox, arrivals, bodies
 
@@ -65,7 +65,7 @@ def _converse(received: Iterator[bytes], outbox: Outbox, arrived: Callable[[], b
     if first is None:
         outbox.close()
         return 1
-    with memory.loading():
+    with collector.loading():
         greeted = greet(first, outbox)
 
         from potto_lsp.server import Server

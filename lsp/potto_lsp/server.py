@@ -15,7 +15,7 @@ from concurrent.futures import Future
 from functools import partial
 from typing import Any
 
-from potto_lsp import errors, memory
+from potto_lsp import collector, failures
 from potto_lsp.asking import Ask, about, uri_of
 from potto_lsp.carrier import StreamServer, settle
 from potto_lsp.client import Client
@@ -23,7 +23,7 @@ from potto_lsp.connection import Reply
 from potto_lsp.crashes import Crashes, Version
 from potto_lsp.deferred import Deferred
 from potto_lsp.documents import Document, Documents
-from potto_lsp.errors import RequestError
+from potto_lsp.failures import RequestError
 from potto_lsp.features import FEATURES, Feature, load_features
 from potto_lsp.greeting import answer
 from potto_lsp.notifications import NOTIFICATIONS, Handler
@@ -83,9 +83,9 @@ class Server(StreamServer):
 
     def refused(self, method: str) -> RequestError | None:
         if self._shut_down:
-            return RequestError(errors.INVALID_REQUEST, "the server was shut down")
+            return RequestError(failures.INVALID_REQUEST, "the server was shut down")
         if self.session is None and method != "initialize":
-            return RequestError(errors.NOT_INITIALIZED, "the first request is `initialize`")
+            return RequestError(failures.NOT_INITIALIZED, "the first request is `initialize`")
         return None
 
     def listens(self, method: str) -> bool:
@@ -99,7 +99,7 @@ class Server(StreamServer):
 
     def _initialize(self, params: Any) -> Any:
         if self.session is not None:
-            raise RequestError(errors.INVALID_REQUEST, "`initialize` comes once")
+            raise RequestError(failures.INVALID_REQUEST, "`initialize` comes once")
         greeting = answer(params)
         client = Client(params)
         self.documents.encoding = client.encoding
@@ -114,7 +114,7 @@ class Server(StreamServer):
 
     def _rest(self) -> bool:
         """What there is time for while nothing is to be done; whether there will be more of it."""
-        memory.rest()
+        collector.rest()
         assert self.session is not None and self.worker is not None
         if self.session.keeps_next():
             self.worker.check_again()
@@ -166,7 +166,7 @@ class Server(StreamServer):
         job = Job(feature.pace, lambda job: self._answer(future, job, feature, ask, document))
         if document is not None and feature.method != "textDocument/diagnostic":
             job.outdated = lambda: self._outdated(ask, document)
-            told = RequestError(errors.CONTENT_MODIFIED, "the document has changed")
+            told = RequestError(failures.CONTENT_MODIFIED, "the document has changed")
             job.drop = lambda job: _finish(future, job, error=told)
         future.add_done_callback(partial(self._ended, job))
         self.worker.put(job)
@@ -200,7 +200,7 @@ class Server(StreamServer):
         except Exception as error:
             self._crashes.note(version)
             told = f"internal error: {type(error).__name__}: {error}"
-            _finish(future, job, error=RequestError(errors.INTERNAL_ERROR, told))
+            _finish(future, job, error=RequestError(failures.INTERNAL_ERROR, told))
         else:
             self._crashes.forget(version)
             if isinstance(result, Deferred):

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Mapping
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from potto_lsp import memory
+from potto_lsp import collector
 from potto_lsp.client import Client
 from potto_lsp.connection import Connection, Reply
 from potto_lsp.presenting import Presenter
@@ -54,7 +54,7 @@ class ClientSession(Connection):
 
     def load(self) -> Database:
         """Load what the work needs. Runs on the thread that will own the database, after the greeting."""
-        with memory.loading():
+        with collector.loading():
             from potto_lsp.analysis import Analysis
             from potto_lsp.evaluation import EvaluationQueue
             from potto_lsp.publishing import Publisher
@@ -70,7 +70,7 @@ class ClientSession(Connection):
     @cached_property
     def live(self) -> LiveValues:
         """The values of live expressions. Slow to import, so this waits for the first diagnostics."""
-        with memory.loading():
+        with collector.loading():
             from potto_lsp.live import LiveValues
         return LiveValues(self)
 
@@ -113,7 +113,7 @@ class ClientSession(Connection):
             for number, step in enumerate(self.publisher.steps_again()):
                 if number == opened:
                     yield None
-                    yield memory.tidy
+                    yield collector.tidy
                 yield step
             yield None
         else:
@@ -183,7 +183,7 @@ class ClientSession(Connection):
         self.analysis.prepare(key)
         self.analysis.prepare_users(key)
         self.to_prepare.discard(key)
-        memory.tidy()
+        collector.tidy()
 
     def _keep(self, key: str) -> None:
         self.to_keep.discard(key)
@@ -191,7 +191,7 @@ class ClientSession(Connection):
 
     def _load_features(self) -> None:
         """Load all adapters, so that the first question doesn't wait for its own."""
-        with memory.loading():
+        with collector.loading():
             self._features()
 
     def _all_checked(self) -> None:
@@ -199,7 +199,7 @@ class ClientSession(Connection):
         self.checked = self.analysis.settled = True
         self._news |= not self.analysis.known_before.issuperset(self.analysis.programs())
         self._progress.end()
-        memory.begin_collecting()
+        collector.begin_collecting()
 
     def close(self) -> None:
         """The session ends."""

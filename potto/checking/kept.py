@@ -1,7 +1,7 @@
 """What was found out about a workspace, kept on disk, so that the next session begins with it.
 
 Owns `Keeper`, which writes it, and `KeptWorkspace`, which reads it, both part by part: each takes milliseconds. Answers
-are kept as they travel between processes (`query/travel`), packed. So nothing is taken over that would not be found
+are kept as they travel between processes (`query/parcels`), packed. So nothing is taken over that would not be found
 here: what was edited meanwhile is checked, and of what rests on it what is reached. There is one entry for a workspace;
 it is bounded as all of the store is.
 """
@@ -18,7 +18,7 @@ from potto.checking.check import definition_diagnostics, diagnostics
 from potto.core.packing import packed, unpacked
 from potto.modules import names
 from potto.query import Database
-from potto.query.travel import Asked, Parcel, Receiver, Sender
+from potto.query.parcels import Asked, Parcel, Receiver, Sender
 
 KIND = "workspaces"
 TOGETHER = 32  # definitions of a part

@@ -46,7 +46,7 @@ def from_file(text: str) -> str:
         path = f"{path}:{rest}"
     whole = f'load("{os.path.abspath(path)}")'
     if colon and not _IN_PROGRAMS.fullmatch(column):  # as the file has it: `height (cm)`
-        from potto.data.texts import identifiers
+        from potto.data.encodings import identifiers
 
         column = identifiers([column])[0]
     return f"({whole}).{column}" if colon else _only(whole, path)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from potto.cli.calling import add_set
 from potto.cli.console import Console
-from potto.cli.numbers import accounts, add_options, settings_of, show_stats, totals
+from potto.cli.evaluation_options import accounts, add_options, settings_of, show_stats, totals
 
 if TYPE_CHECKING:
     from potto.checking.recalled import Question

@@ -12,7 +12,7 @@ from msgspec.structs import asdict
 
 from potto.cli.calling import add_set, argument_in, arguments_in, assignment, called, function_in, with_values
 from potto.cli.console import Console
-from potto.cli.numbers import accounts, add_options, settings_of, show_stats
+from potto.cli.evaluation_options import accounts, add_options, settings_of, show_stats
 
 if TYPE_CHECKING:
     from potto.applications.minimization import Iterate

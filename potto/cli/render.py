@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from potto.cli.calling import add_set, assignment, called, with_values
 from potto.cli.console import Console
-from potto.cli.numbers import accounts, add_options, add_workers, settings_of, show_stats
+from potto.cli.evaluation_options import accounts, add_options, add_workers, settings_of, show_stats
 
 if TYPE_CHECKING:
     from potto.applications.images import Grid

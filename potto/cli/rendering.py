@@ -13,7 +13,7 @@ from msgspec.structs import replace
 
 from potto.cli.calling import argument_in, arguments_in, function_in
 from potto.cli.console import Console
-from potto.cli.numbers import totals
+from potto.cli.evaluation_options import totals
 
 if TYPE_CHECKING:
     from potto.applications.colours import Paint

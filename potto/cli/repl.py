@@ -8,7 +8,7 @@ import sys
 from typing import TYPE_CHECKING, TextIO
 
 from potto.cli.console import Console, wants_color
-from potto.cli.numbers import add_options, settings_of
+from potto.cli.evaluation_options import add_options, settings_of
 
 if TYPE_CHECKING:
     from potto_repl.paint import Screen
@@ -38,8 +38,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
 
         return talk(options, settings, color=wants_color(options.color, sys.stdout), unicode=_unicode(options))
     from potto_repl.options import Options
-    from potto_repl.script import entries, run
     from potto_repl.session import Conversation
+    from potto_repl.without_terminal import entries, run
 
     session = Conversation(["."])
     session.settings = settings

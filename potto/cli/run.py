@@ -7,7 +7,7 @@ from typing import Any
 
 from potto.cli.calling import add_set
 from potto.cli.console import Console
-from potto.cli.numbers import accounts, add_options, settings_of, show_stats
+from potto.cli.evaluation_options import accounts, add_options, settings_of, show_stats
 
 SUMMARY = "run a script"
 EXAMPLE = "  potto run examples/paper/main.po"

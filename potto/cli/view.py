@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from potto.cli.calling import add_set, assignment, called
 from potto.cli.console import Console
-from potto.cli.numbers import add_options, settings_of
+from potto.cli.evaluation_options import add_options, settings_of
 
 if TYPE_CHECKING:
     from potto.evaluating.world import World

@@ -15,7 +15,7 @@ from potto.crew.helper import serve
 from potto.crew.pipes import CheckResult, CheckTask, Part, packed, unpacked
 from potto.crew.processes import begun, can_be_copied
 from potto.query import Database
-from potto.query.travel import Receiver
+from potto.query.parcels import Receiver
 
 logger = logging.getLogger(__name__)
 ENOUGH = 200_000  # bytes of programs for each helper: about twice what is checked in the time that it takes to start

@@ -15,7 +15,7 @@ from potto.modules import open_files
 from potto.modules.misread import piece_diagnostics
 from potto.modules.texts import is_diffeo
 from potto.query import Database
-from potto.query.travel import Asked, Sender
+from potto.query.parcels import Asked, Sender
 
 
 def serve(reader: BinaryIO, writer: BinaryIO) -> None:

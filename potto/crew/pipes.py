@@ -7,7 +7,7 @@ from typing import IO, Any
 
 from msgspec import Struct
 
-from potto.query.travel import Parcel
+from potto.query.parcels import Parcel
 
 LENGTH = 4  # bytes
 

@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, TypeVar
 
 from msgspec import Struct
 
+from potto.data.encodings import identifiers
 from potto.data.mistakes import DataRefused, bad_row, counted, malformed, quoted
-from potto.data.texts import identifiers
 from potto.data.values import DEEPEST, NumberArray, RealNumber, RecordColumns, Sizes, Table
 
 if TYPE_CHECKING:

@@ -12,11 +12,11 @@ from pathlib import Path
 from msgspec import Struct
 
 from potto.data import arrays, pixels
+from potto.data.encodings import text_of
 from potto.data.lists import nested
-from potto.data.memory import Memory
 from potto.data.mistakes import NO_PACKAGE, UNKNOWN_KIND, UNREADABLE, DataMistake, DataRefused, quoted
+from potto.data.parsed_files import Memory
 from potto.data.tables import separated
-from potto.data.texts import text_of
 from potto.data.values import Shape, Value, shape
 from potto.digests import blake2b
 

@@ -19,8 +19,8 @@ from typing import Any
 import msgspec
 from msgspec import Struct
 
+from potto.data.encodings import identifiers
 from potto.data.mistakes import MALFORMED, DataMistake, DataRefused, bad_row, counted, malformed, quoted
-from potto.data.texts import identifiers
 from potto.data.values import DEEPEST, NumberArray, RealNumber, Table, Value
 
 Path = tuple[str | int, ...]

@@ -15,8 +15,8 @@ from math import isfinite
 
 from msgspec import Struct
 
+from potto.data.encodings import identifiers
 from potto.data.mistakes import DataRefused, bad_row, counted, malformed, quoted
-from potto.data.texts import identifiers
 from potto.data.values import NumberArray, RealNumber, Table
 
 WHITE = " "  # any blanks and tabs

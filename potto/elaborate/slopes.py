@@ -18,7 +18,7 @@ from potto.elaborate.values import BuiltinValue, LocalFunction, Value
 from potto.modules.free import free_references
 from potto.source import NOWHERE
 from potto.syntax import nodes
-from potto.syntax.written import without_parentheses
+from potto.syntax.as_written import without_parentheses
 from potto.types import infer_expression
 from potto.types.types import (
     REAL,

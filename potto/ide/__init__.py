@@ -56,9 +56,9 @@ if TYPE_CHECKING:
     from potto.ide.display.views import Viewed, viewed
     from potto.ide.hover.derivatives import derivative_markdown, diffeo_markdown, is_sound
     from potto.ide.hover.hovers import hover_at
-    from potto.ide.names.documents import kind_of
+    from potto.ide.names.descriptions import kind_of
     from potto.ide.names.live_expressions import live_diagnostics, live_in
-    from potto.ide.names.points import CallPoint, looked_at, point_of, points
+    from potto.ide.names.live_points import CallPoint, looked_at, point_of, points
     from potto.ide.names.symbols import definition_at
     from potto.ide.navigation.call_hierarchy import incoming_calls, outgoing_calls, prepare_call_hierarchy
     from potto.ide.navigation.links import document_links, linked_editing
@@ -167,9 +167,9 @@ _HOMES = {
     "display.views": "Viewed viewed",
     "hover.derivatives": "derivative_markdown diffeo_markdown is_sound",
     "hover.hovers": "hover_at",
-    "names.documents": "kind_of",
+    "names.descriptions": "kind_of",
     "names.live_expressions": "live_diagnostics live_in",
-    "names.points": "CallPoint looked_at point_of points",
+    "names.live_points": "CallPoint looked_at point_of points",
     "names.symbols": "definition_at",
     "navigation.call_hierarchy": "incoming_calls outgoing_calls prepare_call_hierarchy",
     "navigation.links": "document_links linked_editing",

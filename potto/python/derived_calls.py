@@ -20,7 +20,7 @@ from potto.kernels.tape import Node, Untaped
 from potto.projects.settings import current
 from potto.python.arguments import LEAST, Batch, value_of, with_axes
 from potto.python.calls import Call
-from potto.python.forms import by_name, in_lists, must_match, weighted
+from potto.python.derivative_forms import by_name, in_lists, must_match, weighted
 from potto.python.moving import each_moving, own, size, with_own, with_places
 from potto.python.sided import with_sides
 from potto.python.slopes import Gradient

@@ -55,7 +55,7 @@ def annotations_of(type: Type) -> dict[str, str]:
 
 def comment_of(world: World, file: str, expr: nodes.Expr | None) -> str | None:
     """The comment above the definition that a name stands for; without a name, that at the head of the file."""
-    from potto.ide.names.documents import documentation, module_documentation
+    from potto.ide.names.descriptions import documentation, module_documentation
 
     if expr is None:
         return module_documentation(world.db, file) or None

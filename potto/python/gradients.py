@@ -15,8 +15,8 @@ from msgspec.structs import replace
 
 from potto.kernels.cells import Cell, all_cells
 from potto.kernels.errors import wrong_call
+from potto.python.derivative_forms import as_matrix, bounds_of, in_lists, tangents_of
 from potto.python.derived_calls import DerivedCall
-from potto.python.forms import as_matrix, bounds_of, in_lists, tangents_of
 from potto.python.functions import Function
 from potto.python.gradient_functions import GradientFunction, in_given_form
 from potto.python.hessian import second_gradient

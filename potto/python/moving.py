@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Mapping
 
 from potto.kernels.cells import Cell, Rows, Value, listed
 from potto.kernels.errors import wrong_call
-from potto.python.forms import form_of
+from potto.python.derivative_forms import form_of
 
 PRIMAL = ".0"
 

@@ -17,6 +17,6 @@ Threads: one thread evaluates or writes at a time; others wait, but a memo that 
 
 from potto.query.database import Database
 from potto.query.declare import query
-from potto.query.nodes import Cancelled, CycleError, Parted, QueryEvent
+from potto.query.memos import Cancelled, CycleError, Parted, QueryEvent
 
 __all__ = ["Cancelled", "CycleError", "Database", "Parted", "QueryEvent", "query"]

@@ -8,7 +8,7 @@ from threading import get_ident
 from typing import Any, TypeVar, cast
 
 from potto.query.engine import Engine
-from potto.query.nodes import (
+from potto.query.memos import (
     FOREVER,
     GONE,
     MISSING,
@@ -104,7 +104,7 @@ class Database(Engine):
         with self.evaluating():
             return tuple((key, node) for key, node in self._inputs.items())
 
-    # Answers found elsewhere, see `travel`
+    # Answers found elsewhere, see `parcels`
 
     def input(self, key: Hashable) -> Input:
         """An input, loaded if it was never read."""

@@ -8,7 +8,7 @@ from threading import get_ident
 from typing import Any, Concatenate, ParamSpec, TypeVar, overload
 
 from potto.query.database import Database
-from potto.query.nodes import GONE, Cancelled, Query
+from potto.query.memos import GONE, Cancelled, Query
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -33,7 +33,7 @@ def query(
 
     `cycle(db, *args)` gives its value when it is part of a cycle. `keep`: roughly how many memos to keep, for
     queries on texts that go out of use; the least recently used go first, never those of the present revision.
-    `travels`: its answers can be pickled and are worth sending, see `travel`. `cuts`: most edits of what it reads
+    `travels`: its answers can be pickled and are worth sending, see `parcels`. `cuts`: most edits of what it reads
     leave its answer as it is, so readers depend on the answer and not on what lies below. Of other queries this is
     noticed once it happens.
     """

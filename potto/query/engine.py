@@ -15,7 +15,7 @@ from threading import get_ident
 from typing import Any, Final, Literal
 
 from potto.query.leaves import leaves_of
-from potto.query.nodes import (
+from potto.query.memos import (
     DURABILITIES,
     FOREVER,
     GONE,

@@ -6,7 +6,7 @@ from collections.abc import Container
 from itertools import chain
 from typing import Final
 
-from potto.query.nodes import Leaf, Memo, Node
+from potto.query.memos import Leaf, Memo, Node
 
 LEAVES: Final = 512  # leaves kept for a memo: checking more of them would take as long as walking
 

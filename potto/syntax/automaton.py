@@ -12,7 +12,7 @@ from typing import Any
 
 from potto.syntax import build, build_arrays, build_integrals, build_items, build_types
 from potto.syntax.groups import Context
-from potto.syntax.tables import Tables, tables
+from potto.syntax.parse_tables import Tables, tables
 from potto.syntax.tokens import Token
 
 Action = Callable[[Context, list[Any]], Any]

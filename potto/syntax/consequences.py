@@ -1,7 +1,8 @@
 """Which messages of a chunk follow from others: one mistake has one message.
 
-Owns `Told`, `only` and `without_consequences`. Messages come from the tokens, from where the grammar stops, and from
-those who make trees of what it read or was repaired into; each may only repeat, or be misled by, what another one says.
+Owns `Reported`, `only` and `without_consequences`. Messages come from the tokens, from where the grammar stops, and
+from those who make trees of what it read or was repaired into; each may only repeat, or be misled by, what another one
+says.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ OF_LINES = (kinds.LAST_LINE.code, kinds.NOT_A_NAME.code, kinds.DEFINITION_HEAD.c
 """What is said of a whole line, or head, because something in it was not understood."""
 
 
-class Told:
+class Reported:
     """What is said of a chunk, as it is found out."""
 
     def __init__(self, of_tokens: list[Diagnostic], end: int) -> None:

@@ -17,7 +17,7 @@ from potto.source import Span
 from potto.syntax import kinds
 from potto.syntax.automaton import Automaton
 from potto.syntax.chunks import split
-from potto.syntax.consequences import Told, only, without_consequences
+from potto.syntax.consequences import Reported, only, without_consequences
 from potto.syntax.foreign_integrals import foreign_integral
 from potto.syntax.foreign_records import declared_elsewhere, in_braces
 from potto.syntax.groups import Context
@@ -157,7 +157,7 @@ def _sorted(diagnostics: list[Diagnostic]) -> tuple[Diagnostic, ...]:
 
 def _parse(lexed: Lexed, text: str, start: str, diffeo: bool = False) -> _Parse:
     """Run the automaton to the end, repairing as it goes; None as value if it had to give up."""
-    tokens, told = lexed.tokens, Told(lexed.diagnostics, len(text))
+    tokens, told = lexed.tokens, Reported(lexed.diagnostics, len(text))
     automaton = Automaton(Context(text, diffeo), start)
     index = automaton.run(tokens, 0)
     first_stop: Stop | None = None

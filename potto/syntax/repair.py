@@ -10,7 +10,7 @@ from __future__ import annotations
 import heapq
 from typing import Literal, NamedTuple
 
-from potto.syntax.tables import Tables
+from potto.syntax.parse_tables import Tables
 from potto.syntax.tokens import KEYWORDS, Token
 
 Stack = tuple[int, "Stack | None"]

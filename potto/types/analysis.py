@@ -32,6 +32,7 @@ from potto.types.algebra import fitted, flat, symbolic
 from potto.types.annotations import written_type
 from potto.types.closing import declared, reasons_of
 from potto.types.context import Inference, NamedPart, ensure_stack
+from potto.types.endless_recursion import endless
 from potto.types.flow import Walk
 from potto.types.infer import bindings, returned
 from potto.types.interfaces import Closing, Decorating, Interface, chain_of
@@ -40,7 +41,6 @@ from potto.types.mismatches import mismatch
 from potto.types.motionless import is_derivative
 from potto.types.reasons import NO_REASONS, Reasons
 from potto.types.records import labelled
-from potto.types.recursion import endless
 from potto.types.scope import Outside
 from potto.types.types import UNKNOWN, Diffeo, Dist, Function, Meta, Parameter, Real, Type, Unknown, groups_of, resolve
 from potto.types.unify import close_type, unify

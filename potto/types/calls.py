@@ -16,11 +16,10 @@ from potto.primitives import PRIMITIVES
 from potto.reports.near import did_you_mean, instead, near_names
 from potto.source import Span
 from potto.syntax import nodes
+from potto.syntax.as_written import without_parentheses
 from potto.syntax.printer import print_expression
-from potto.syntax.written import without_parentheses
 from potto.types import kinds
 from potto.types.context import ArgumentPlan, Inference, rule
-from potto.types.forms import delta, deriv
 from potto.types.infer import is_known, special
 from potto.types.loading import loaded
 from potto.types.mismatches import between, comparison, describe, no_field, of_one
@@ -28,6 +27,7 @@ from potto.types.motionless import check_tangents, takes_duals
 from potto.types.origins import misfit
 from potto.types.scope import BuiltinName
 from potto.types.slopes import slope
+from potto.types.special_forms import delta, deriv
 from potto.types.still import makes_dual, stands_still
 from potto.types.types import (
     REAL,

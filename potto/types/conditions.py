@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from potto.diagnostics import Diagnostic, Related
 from potto.syntax import nodes
-from potto.syntax.written import without_parentheses
+from potto.syntax.as_written import without_parentheses
 from potto.types import kinds
 from potto.types.context import Condition, Inference, rule
 from potto.types.infer import value_only

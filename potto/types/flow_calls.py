@@ -7,8 +7,8 @@ from collections.abc import Iterator, Sequence
 from potto.modules.builtins import DERIVATIVES, LOOK_UPS, VECTORS
 from potto.primitives import PRIMITIVES
 from potto.syntax import nodes
+from potto.syntax.as_written import without_parentheses
 from potto.syntax.printer import print_expression
-from potto.syntax.written import without_parentheses
 from potto.types.algebra import flat, jumps_of, merge, still
 from potto.types.apply import call
 from potto.types.calls import callee_name

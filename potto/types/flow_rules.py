@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 from potto.source import Span
 from potto.syntax import nodes
-from potto.syntax.written import without_parentheses
+from potto.syntax.as_written import without_parentheses
 from potto.types.algebra import (
     flat,
     join,

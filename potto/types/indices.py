@@ -13,8 +13,8 @@ from msgspec import Struct
 from potto.diagnostics import Related, Suggestion, shortened, suggest
 from potto.source import Span
 from potto.syntax import nodes
+from potto.syntax.as_written import number, without_parentheses
 from potto.syntax.printer import print_expression
-from potto.syntax.written import number, without_parentheses
 from potto.types import kinds
 from potto.types.context import End, IndexReach, Inference, rule
 from potto.types.mismatches import between

@@ -13,7 +13,7 @@ from potto.diagnostics import Diagnostic, Related
 from potto.modules.builtins import DERIVATIVES, SPECIALS
 from potto.primitives import PRIMITIVES
 from potto.syntax import nodes
-from potto.syntax.written import without_parentheses
+from potto.syntax.as_written import without_parentheses
 from potto.types import kinds
 from potto.types.annotations import written_type
 from potto.types.context import Inference, rule

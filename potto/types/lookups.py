@@ -6,7 +6,7 @@ from itertools import pairwise
 
 from potto.diagnostics import Related
 from potto.syntax import nodes
-from potto.syntax.written import number, without_parentheses
+from potto.syntax.as_written import number, without_parentheses
 from potto.types import kinds
 from potto.types.context import Inference
 from potto.types.format import format_type

@@ -14,8 +14,8 @@ from msgspec.structs import replace
 from potto.diagnostics import Diagnostic, Suggestion, shortened
 from potto.source import NOWHERE
 from potto.syntax import nodes
+from potto.syntax.as_written import without_parentheses
 from potto.syntax.printer import print_expression
-from potto.syntax.written import without_parentheses
 from potto.types import kinds
 from potto.types.context import ArgumentPlan, Inference
 from potto.types.mismatches import around

@@ -9,7 +9,7 @@ from msgspec.structs import replace
 from potto.diagnostics import Diagnostic, Related
 from potto.modules.texts import definition
 from potto.syntax import nodes
-from potto.syntax.written import without_parentheses
+from potto.syntax.as_written import without_parentheses
 from potto.types.context import Inference
 from potto.types.format import format_type
 from potto.types.mismatches import BY_PARTS, differs_in_size, mismatch, sized_by

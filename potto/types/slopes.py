@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from potto.diagnostics import Diagnostic
 from potto.reports.near import did_you_mean, instead, near_names
 from potto.syntax import nodes
-from potto.syntax.written import without_parentheses
+from potto.syntax.as_written import without_parentheses
 from potto.types import kinds
 from potto.types.context import Inference
 from potto.types.infer import is_known

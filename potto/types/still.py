@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from potto.syntax import nodes
-from potto.syntax.written import without_parentheses
+from potto.syntax.as_written import without_parentheses
 from potto.types.context import Inference
 from potto.types.mismatches import needs_deriv
 from potto.types.motionless import head_of

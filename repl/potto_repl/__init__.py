@@ -1,5 +1,5 @@
 """The prompt: a conversation with Potto.
 
 `respond(session, text)` answers an entry or a command without any terminal; `terminal` puts a terminal around it and
-`script` a pipe. Importing this package imports nothing.
+`without_terminal` a pipe. Importing this package imports nothing.
 """

@@ -26,10 +26,10 @@ from potto.reports.render import Located
 from potto.runtime.answers.estimate import Estimate
 from potto.source import Span
 from potto.syntax import nodes
+from potto_repl.backslash_symbols import pretty
 from potto_repl.reply import Part, answer, diagnostic, note
 from potto_repl.session import Conversation, plain_names
-from potto_repl.symbols import pretty
-from potto_repl.values import Parts, parts_of, value_parts
+from potto_repl.shown_values import Parts, parts_of, value_parts
 
 NOT_DEFINED = "P0201"
 ANSWER = re.compile("_[0-9]*")  # the names under which answers stay at hand

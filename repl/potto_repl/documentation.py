@@ -18,7 +18,7 @@ from potto.types import format_type, interface
 def documentation(db: Database, name: str, target: DefinitionTarget | None) -> str | None:
     """All there is to say about a name; None if it means nothing."""
     from potto.ide.hover.hovers import builtin_markdown, measure_markdown
-    from potto.ide.names.words import KEYWORDS, SPECIALS
+    from potto.ide.names.keywords import KEYWORDS, SPECIALS
 
     if target is not None:
         return _of_definition(db, name, target)
@@ -36,7 +36,7 @@ def documentation(db: Database, name: str, target: DefinitionTarget | None) -> s
 
 def documented() -> list[str]:
     """The names that have an explanation without being defined."""
-    from potto.ide.names.words import KEYWORDS, SPECIALS
+    from potto.ide.names.keywords import KEYWORDS, SPECIALS
 
     return [*PRIMITIVES, *MEASURES, *COMPOSITIONS, *KEYWORDS, *SPECIALS]
 
@@ -49,7 +49,7 @@ def plain(markdown: str) -> str:
 
 
 def _of_definition(db: Database, name: str, target: DefinitionTarget) -> str:
-    from potto.ide.names.documents import documentation as comment_of
+    from potto.ide.names.descriptions import documentation as comment_of
 
     found = interface(db, target.file, target.name)
     parts = [f"{name} : {format_type(found.type)}"]

@@ -22,7 +22,7 @@ def is_over(text: str) -> bool:
     if not stripped or stripped.startswith(":") or re.fullmatch(r"\S+\?{1,2}", stripped):
         return True
     from potto.syntax import completeness
-    from potto_repl.symbols import readable
+    from potto_repl.backslash_symbols import readable
 
     text = flush_left(text)
     lines = text.split("\n")

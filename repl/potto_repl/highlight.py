@@ -15,7 +15,7 @@ from prompt_toolkit.formatted_text import StyleAndTextTuples
 from prompt_toolkit.lexers import Lexer
 from prompt_toolkit.styles import Style
 
-from potto_repl.loading import Loader
+from potto_repl.session_loading import Loader
 
 Mark = tuple[int, int]  # from where to where something is wrong
 THEMES: dict[str, dict[str, str]] = {

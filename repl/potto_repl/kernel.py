@@ -12,13 +12,13 @@ from ipykernel.kernelbase import Kernel
 
 from potto import __version__
 from potto.applications.framed import Image
-from potto_repl.cells import placed, result
+from potto_repl.backslash_symbols import expanded, named, readable, typed
 from potto_repl.complete import candidates
 from potto_repl.editing import indentation, is_over
+from potto_repl.notebook_cells import placed, result
 from potto_repl.reply import Part
 from potto_repl.respond import respond, stream
 from potto_repl.session import Conversation
-from potto_repl.symbols import expanded, named, readable, typed
 
 
 class PottoKernel(Kernel):

@@ -1,6 +1,6 @@
 """What keys do at the prompt: Enter, Tab, indentation, pastes, and suggestions that only the right arrow takes.
 
-Owns `bindings`. What text means is decided in `editing` and `symbols`.
+Owns `bindings`. What text means is decided in `editing` and `backslash_symbols`.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from prompt_toolkit.filters import Condition, Filter, emacs_mode, has_focus, is_
 from prompt_toolkit.key_binding import KeyBindings, KeyPressEvent
 from prompt_toolkit.keys import Keys
 
+from potto_repl.backslash_symbols import expanded, typed
 from potto_repl.editing import INDENT, indentation, is_over, unprompted, untabbed
-from potto_repl.symbols import expanded, typed
 
 
 def bindings() -> KeyBindings:

@@ -16,7 +16,7 @@ from potto.kernels.errors import wrong_call
 from potto.python.api import Module
 from potto.reports.render import Located, ProgramError
 from potto_repl.answers import NOT_DEFINED
-from potto_repl.symbols import readable
+from potto_repl.backslash_symbols import readable
 
 
 class CellError(ProgramError):

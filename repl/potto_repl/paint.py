@@ -10,9 +10,9 @@ from msgspec import Struct
 from potto.applications.framed import Image
 from potto.applications.pictures import Plot
 from potto.reports.render import COLORS, PLAIN, Palette
+from potto_repl.backslash_symbols import ascii_only
 from potto_repl.drawing import Protocol, braille, half_blocks, inline, room_for_curves, shrunk
 from potto_repl.reply import Part
-from potto_repl.symbols import ascii_only
 
 DIM, OFF = "\x1b[2m", "\x1b[0m"
 

@@ -1,7 +1,7 @@
 """The commands of the prompt: one table, filled by `@command`.
 
-Owns `Command`, `COMMANDS` and how a word finds its command. The docstring of a command is its help: the first line in
-the overview, all of it in `:help NAME`.
+Owns `PromptCommand`, `COMMANDS` and how a word finds its command. The docstring of a command is its help: the first
+line in the overview, all of it in `:help NAME`.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ Run = Callable[["Conversation", str], Result]
 Completes = Literal["expression", "name", "file", "code", "setting", "method", "command", "nothing"]
 
 
-class Command(Struct, frozen=True):
+class PromptCommand(Struct, frozen=True):
     """A command: `name` and a `short` form, what its argument is called, and how that is completed."""
 
     name: str
@@ -42,7 +42,7 @@ class Command(Struct, frozen=True):
         return f":{self.name} {self.argument}".rstrip()
 
 
-COMMANDS: dict[str, Command] = {}
+COMMANDS: dict[str, PromptCommand] = {}
 
 
 def command(
@@ -53,13 +53,13 @@ def command(
     def declare(run: Run) -> Run:
         if name in COMMANDS:
             raise ValueError(f"the command {name} is declared twice")
-        COMMANDS[name] = Command(name, short, argument, completes, inspect.getdoc(run) or "", run)
+        COMMANDS[name] = PromptCommand(name, short, argument, completes, inspect.getdoc(run) or "", run)
         return run
 
     return declare
 
 
-def find(word: str) -> Command:
+def find(word: str) -> PromptCommand:
     """The command that a word means: its name, its short form or a prefix that only it has. Raises Refusal."""
     if word in COMMANDS:
         return COMMANDS[word]

@@ -12,10 +12,10 @@ from collections.abc import Iterator
 
 from msgspec import Struct
 
-from potto_repl.records import Recorded, recorded
+from potto_repl.backslash_symbols import readable
+from potto_repl.recordings import Recorded, recorded
 from potto_repl.respond import respond
 from potto_repl.session import Conversation
-from potto_repl.symbols import readable
 
 _NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e-?\d+)?")
 _MEASURED = re.compile(

@@ -13,7 +13,7 @@ from potto.diagnostics import PottoError
 from potto.reports.render import Located, ProgramError, display_name
 from potto_repl import commands as _commands  # noqa: F401  (fills the table)
 from potto_repl.editing import flush_left
-from potto_repl.records import prompted
+from potto_repl.recordings import prompted
 from potto_repl.registry import Result, find
 from potto_repl.reply import Part, Refusal, Reply, diagnostic, note
 from potto_repl.session import Conversation

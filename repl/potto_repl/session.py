@@ -20,7 +20,7 @@ from potto.source import SourceText
 from potto_repl.options import Options
 
 if TYPE_CHECKING:
-    from potto_repl.values import Parts
+    from potto_repl.shown_values import Parts
 
 TYPING = "<typing>"
 _OUT = re.compile(r"\bOut\[(\d+)\]")

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import shutil
 
+from potto_repl.banner import greeting, say
 from potto_repl.editing import is_over
-from potto_repl.greeting import greeting, say
 from potto_repl.keyboard import kept_interrupts
-from potto_repl.loading import Loader
+from potto_repl.session_loading import Loader
 
 
 class Simple:
@@ -49,9 +49,9 @@ class Simple:
     def answer(self, text: str) -> None:
         try:
             session = self.loader.session  # waited for, so that only one thread imports what it needs
+            from potto_repl.backslash_symbols import readable
             from potto_repl.paint import Screen, painted
             from potto_repl.respond import stream
-            from potto_repl.symbols import readable
 
             look = Screen(unicode=self.unicode, width=shutil.get_terminal_size().columns, breaks=True)
             for part in stream(session, readable(text)):

@@ -17,7 +17,7 @@ from potto.types.types import ArrayOf, Diffeo, Function, Parameter, TupleOf, hol
 from potto_repl.expressions import Called, checked
 from potto_repl.reply import Refusal
 from potto_repl.session import Conversation
-from potto_repl.values import Parts, parts_of
+from potto_repl.shown_values import Parts, parts_of
 
 _NO_NUMBERS = (Function, Diffeo, TupleOf, ArrayOf)
 

@@ -9,7 +9,7 @@ import argparse
 import os
 
 from potto.projects.settings import Settings
-from potto_repl.loading import Loader
+from potto_repl.session_loading import Loader
 
 
 def talk(options: argparse.Namespace, settings: Settings, *, color: bool, unicode: bool) -> int:

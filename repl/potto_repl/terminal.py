@@ -28,12 +28,12 @@ from prompt_toolkit.output import ColorDepth
 from prompt_toolkit.styles import DynamicStyle
 
 from potto.evaluating.progress import PLAIN, Progress
-from potto_repl.beside import Checker
-from potto_repl.greeting import greeting
+from potto_repl.background import Checker
+from potto_repl.banner import greeting
 from potto_repl.highlight import PottoCompleter, PottoLexer, style
 from potto_repl.keyboard import kept_interrupts, loud_keys, quiet_keys
 from potto_repl.keys import bindings
-from potto_repl.loading import Loader
+from potto_repl.session_loading import Loader
 
 NARROW = 40
 WATCH = 0.3  # seconds between two looks at the files
@@ -161,8 +161,8 @@ class Terminal:
                 self._attach()
                 self.progress.note(PLAIN)
                 from potto.runtime.evaluation.record import Gauge, watching
+                from potto_repl.backslash_symbols import readable
                 from potto_repl.respond import stream
-                from potto_repl.symbols import readable
 
                 with watching(Gauge()) as self.progress.gauge:
                     for part in stream(self.loader.session, readable(text)):

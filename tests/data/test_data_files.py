@@ -12,7 +12,7 @@ import pytest
 from data_files import mistake
 
 from potto.data import SUFFIXES, TITLES, DataMistake, NumberArray, RealNumber, read, shape_of, suggest, values_of
-from potto.data.memory import Memory
+from potto.data.parsed_files import Memory
 
 
 def unread(path: Path) -> tuple[str, str, str]:

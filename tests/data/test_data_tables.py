@@ -13,9 +13,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from potto.data import DataMistake, shape_of, values_of
+from potto.data.encodings import identifiers
 from potto.data.files import MEMORY
 from potto.data.tables import separated
-from potto.data.texts import identifiers
 from potto.data.values import NumberArray, RecordColumns, Sizes, Table
 from potto.syntax.tokens import FIRST_NAME
 

@@ -33,7 +33,8 @@ class Client:
         self.replies: dict[str, Any] = {"workspace/configuration": [{}]}  # what the server is answered; else null
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
-        threading.Thread(target=self._complaints, daemon=True).start()
+        self._listener = threading.Thread(target=self._complaints, daemon=True)
+        self._listener.start()
         self.capabilities = EVERYTHING if capabilities is None else capabilities
         self.folder, self.params = folder, params
 
@@ -115,6 +116,7 @@ class Client:
         try:
             status = self.process.wait(seconds)
             self._reader.join(seconds)
+            self._listener.join(1)  # a process of the server's may hold the other end for longer
             return status
         finally:
             self.process.kill()

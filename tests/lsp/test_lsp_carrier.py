@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 from potto_lsp.carrier import Protocol, StreamServer, settle
-from potto_lsp.errors import RequestError
+from potto_lsp.failures import RequestError
 
 LAZILY = """
 import sys

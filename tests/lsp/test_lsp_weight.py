@@ -14,7 +14,7 @@ from typing import Any
 
 import pytest
 from lsp_client import EVERYTHING, Client
-from potto_lsp import memory
+from potto_lsp import collector
 from potto_lsp.progress import WorkProgress
 
 Server = Callable[..., Client]
@@ -164,11 +164,11 @@ def test_what_was_loaded_is_never_collected_again() -> None:
     """A full collection in the middle of typing took a quarter of a second."""
     before = gc.get_threshold()
     try:
-        with memory.loading():
+        with collector.loading():
             assert not gc.isenabled()
-        memory.begin_collecting()
+        collector.begin_collecting()
         assert gc.isenabled() and gc.get_freeze_count() > 10_000
-        assert gc.get_threshold() == memory.THRESHOLDS and memory.THRESHOLDS[0] >= 50_000
+        assert gc.get_threshold() == collector.THRESHOLDS and collector.THRESHOLDS[0] >= 50_000
     finally:
         gc.unfreeze()
         gc.set_threshold(*before)
@@ -178,8 +178,8 @@ def test_new_objects_are_looked_through_once_open_files_have_been_told_of() -> N
     """Where that waits until a collection comes by itself, it comes in the middle of a key, and takes 10 to 40 ms."""
     before = gc.get_threshold()
     try:
-        memory.begin_collecting()
-        for look, generation, many in ((memory.tidy, 0, memory.YOUNG), (memory.rest, 1, memory.MIDDLE)):
+        collector.begin_collecting()
+        for look, generation, many in ((collector.tidy, 0, collector.YOUNG), (collector.rest, 1, collector.MIDDLE)):
             gc.collect(generation)
             looked = gc.get_stats()[generation]["collections"]
             look()  # at nothing new

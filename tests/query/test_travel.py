@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 
 from potto.query import Cancelled, Database, query
-from potto.query.nodes import Memo
-from potto.query.travel import Receiver, Sender
+from potto.query.memos import Memo
+from potto.query.parcels import Receiver, Sender
 
 NAMES = "abcdefgh"
 

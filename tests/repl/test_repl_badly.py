@@ -10,9 +10,9 @@ import sys
 
 import pytest
 from potto_repl.editing import untabbed
-from potto_repl.registry import COMMANDS, Command
+from potto_repl.registry import COMMANDS, PromptCommand
 from potto_repl.replay import replayed
-from potto_repl.script import entries
+from potto_repl.without_terminal import entries
 from screens import Screen
 
 POTTO = [sys.executable, "-m", "potto"]
@@ -197,7 +197,9 @@ def test_a_crash_in_any_command_is_a_short_report(talk, monkeypatch):
         raise RuntimeError("ours")
 
     for name, entry in list(COMMANDS.items()):
-        monkeypatch.setitem(COMMANDS, name, Command(name, entry.short, entry.argument, "nothing", entry.help, broken))
+        monkeypatch.setitem(
+            COMMANDS, name, PromptCommand(name, entry.short, entry.argument, "nothing", entry.help, broken)
+        )
         reply = talk(f":{name}")
         assert reply.failed and len(reply.text.splitlines()) == 5 and "RuntimeError" in reply.text
         assert "Traceback" not in reply.text and "the session goes on" in reply.text
@@ -224,7 +226,7 @@ def test_a_crash_whose_report_cannot_be_written(talk, monkeypatch):
     def full(*_, **__):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setitem(COMMANDS, "type", Command("type", "t", "", "nothing", "", lambda s, t: 1 / 0))
+    monkeypatch.setitem(COMMANDS, "type", PromptCommand("type", "t", "", "nothing", "", lambda s, t: 1 / 0))
     monkeypatch.setattr(tempfile, "mkstemp", full)
     assert "could not be written" in talk(":type 1").text
     alive(talk)

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import pytest
+from potto_repl.backslash_symbols import SYMBOLS, ascii_only, expanded, pretty, readable, typed
 from potto_repl.complete import candidates
 from potto_repl.editing import indentation, is_over, unprompted
-from potto_repl.symbols import SYMBOLS, ascii_only, expanded, pretty, readable, typed
 
 
 @pytest.mark.parametrize("text", [

@@ -7,7 +7,7 @@ import time
 
 import pytest
 from potto_repl.complete import candidates
-from potto_repl.loading import Loader
+from potto_repl.session_loading import Loader
 from potto_repl.terminal import Terminal
 from prompt_toolkit.application import create_app_session
 from prompt_toolkit.history import InMemoryHistory
@@ -147,7 +147,7 @@ def test_the_talk_answers_and_leaves(loader, capsys):
 
 
 def test_what_is_wrong_is_underlined_while_one_types(loader):
-    from potto_repl.beside import Checker
+    from potto_repl.background import Checker
 
     seen = threading.Event()
     checker = Checker(loader, seen.set)

@@ -6,7 +6,7 @@ import os
 import re
 
 import pytest
-from potto_repl.greeting import greeting
+from potto_repl.banner import greeting
 from potto_repl.paint import Screen, painted
 from potto_repl.registry import COMMANDS
 from potto_repl.terminal import Terminal

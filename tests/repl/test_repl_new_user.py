@@ -11,7 +11,7 @@ import re
 from pathlib import Path
 
 import pytest
-from potto_repl.script import entries
+from potto_repl.without_terminal import entries
 
 HERE = Path(__file__).parent
 GOLDEN = HERE / "new_user_transcript.txt"

@@ -25,7 +25,7 @@ from potto.syntax.automaton import Automaton
 from potto.syntax.groups import Context
 from potto.syntax.lexer import lex
 from potto.syntax.nodes import Paren
-from potto.syntax.tables import grammar_text, lark_parser
+from potto.syntax.parse_tables import grammar_text, lark_parser
 from potto.syntax.walk import without_spans
 
 LAW = settings(max_examples=100, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))

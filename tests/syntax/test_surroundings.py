@@ -16,8 +16,8 @@ from potto.syntax import (
     live_expressions,
     node_at,
     parse_chunk,
+    parse_tables,
     split,
-    tables,
     tokenize,
 )
 from potto.syntax.nodes import Apply, Definition, Name
@@ -150,9 +150,9 @@ class TestTables:
     def test_those_of_the_file_are_those_of_the_grammar(self) -> None:
         """If this fails: `make tables`. lark numbers states in an order of its own each time, so one
         automaton is walked beside the other."""
-        written, computed = tables.written(), tables.compute(tables.grammar_text())
+        written, computed = parse_tables.written(), parse_tables.compute(parse_tables.grammar_text())
         assert written is not None and written.starts.keys() == computed.starts.keys()
-        beside = {written.starts[name]: computed.starts[name] for name in tables.STARTS}
+        beside = {written.starts[name]: computed.starts[name] for name in parse_tables.STARTS}
         waiting = list(beside)
         for state in waiting:
             row, other = written.rows[state], computed.rows[beside[state]]
@@ -164,17 +164,17 @@ class TestTables:
                     beside[action] = other[symbol]
                     waiting.append(action)
                 assert action < 0 or beside[action] == other[symbol]
-        assert {written.ends[name]: computed.ends[name] for name in tables.STARTS}.items() <= beside.items()
+        assert {written.ends[name]: computed.ends[name] for name in parse_tables.STARTS}.items() <= beside.items()
 
     def test_a_grammar_that_was_changed_is_computed_again(
         self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        grammar = tables.grammar_text()
-        monkeypatch.setattr(tables, "FILE", tmp_path / "tables.json")
-        tables.write()
-        assert tables.written() is not None
-        monkeypatch.setattr(tables, "grammar_text", lambda: grammar + "\n")
-        assert tables.written() is None and tables.tables.__wrapped__().starts
+        grammar = parse_tables.grammar_text()
+        monkeypatch.setattr(parse_tables, "FILE", tmp_path / "parse_tables.json")
+        parse_tables.write()
+        assert parse_tables.written() is not None
+        monkeypatch.setattr(parse_tables, "grammar_text", lambda: grammar + "\n")
+        assert parse_tables.written() is None and parse_tables.tables.__wrapped__().starts
 
     def test_no_conflicts_but_the_known_ones(self, caplog: pytest.LogCaptureFixture) -> None:
         import logging
@@ -182,7 +182,7 @@ class TestTables:
         from lark import logger
 
         with caplog.at_level(logging.DEBUG, logger.name):
-            tables.lark_parser(tables.grammar_text())
+            parse_tables.lark_parser(parse_tables.grammar_text())
         # Operators and `?` after an open-ended form go into it; a bracket after a type or a group belongs to it, a
         # type after the size of an array, and a bracket to what it stands directly behind.
         conflicts = {str(record.args) for record in caplog.records if "conflict" in str(record.msg)}

@@ -15,8 +15,8 @@ from potto.modules import names
 from potto_lsp import protocol
 from potto_lsp.asking import Ask
 from potto_lsp.deferred import Deferred
-from potto_lsp.errors import InvalidParams, RequestError, RequestRefused
 from potto_lsp.evaluation import EvaluationTask
+from potto_lsp.failures import InvalidParams, RequestError, RequestRefused
 from potto_lsp.features.lenses import offers
 from potto_lsp.presenting import INFO
 from potto_lsp.progress import Working

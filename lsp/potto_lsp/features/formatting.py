@@ -8,7 +8,7 @@ from potto.modules import is_diffeo
 from potto.query import Database, query
 from potto_lsp import convert, protocol
 from potto_lsp.asking import Ask
-from potto_lsp.features.whole import PieceItems, part_of, whole
+from potto_lsp.features.by_piece import PieceItems, part_of, whole
 from potto_lsp.text import DocumentText, Encoding
 from potto_lsp.wire import Encoded
 

@@ -11,7 +11,7 @@ from potto.query import Database, query
 from potto.source import Span
 from potto_lsp import convert, protocol
 from potto_lsp.asking import Ask
-from potto_lsp.features.whole import PieceItems, lined, part_of
+from potto_lsp.features.by_piece import PieceItems, lined, part_of
 from potto_lsp.text import DocumentText, Encoding
 from potto_lsp.wire import Encoded
 

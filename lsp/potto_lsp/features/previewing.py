@@ -17,9 +17,9 @@ from potto.source import Span
 from potto_lsp import convert, protocol
 from potto_lsp.asking import Ask
 from potto_lsp.deferred import Deferred
-from potto_lsp.errors import InvalidParams
+from potto_lsp.failures import InvalidParams
+from potto_lsp.features.by_piece import PieceItems, part_of, whole
 from potto_lsp.features.commands import task
-from potto_lsp.features.whole import PieceItems, part_of, whole
 from potto_lsp.text import DocumentText, Encoding
 from potto_lsp.wire import Encoded
 

@@ -8,7 +8,7 @@ from typing import Any
 from potto import ide
 from potto_lsp import convert, protocol
 from potto_lsp.asking import Ask
-from potto_lsp.errors import RequestRefused
+from potto_lsp.failures import RequestRefused
 from potto_lsp.uris import to_key
 
 

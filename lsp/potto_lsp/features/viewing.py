@@ -12,7 +12,7 @@ from potto import ide
 from potto.applications.integral_page import parts
 from potto_lsp.asking import Ask
 from potto_lsp.deferred import Deferred
-from potto_lsp.errors import InvalidParams
+from potto_lsp.failures import InvalidParams
 from potto_lsp.features.commands import task
 
 

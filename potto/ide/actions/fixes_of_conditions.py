@@ -21,8 +21,8 @@ from potto.ide.names.places import ChunkAt, chunk_at
 from potto.query import Database
 from potto.source import Span
 from potto.syntax import extent, node_at, nodes, walk
+from potto.syntax.as_written import without_parentheses
 from potto.syntax.nodes import Expr
-from potto.syntax.written import without_parentheses
 
 
 def bracket_fixes(place: At, said: Diagnostic) -> Iterator[PendingAction]:

@@ -16,7 +16,7 @@ from potto.modules import find_module
 from potto.modules.workspace import definers, module_name
 from potto.source import Span
 from potto.syntax import nodes, walk
-from potto.syntax.written import without_parentheses
+from potto.syntax.as_written import without_parentheses
 
 _NAME = re.compile(r"[^\W\d]\w*")
 MOST_MODULES = 5  # that are offered to import a name from

@@ -14,8 +14,8 @@ from msgspec.structs import replace
 
 from potto.data.files import beside
 from potto.ide.actions.imports import import_edit, importable, new_line
-from potto.ide.completion.fields import changed_items, part_items
 from potto.ide.completion.modules import member_items, module_items, name_items
+from potto.ide.completion.parts_of_values import changed_items, part_items
 from potto.ide.completion.pending_calls import call_in
 from potto.ide.completion.place import CompletionPlace, place_in
 from potto.ide.completion.signature_help import called_in
@@ -23,10 +23,10 @@ from potto.ide.hover.derivatives import fence
 from potto.ide.hover.hovers import builtin_markdown, measure_markdown, measure_signature, module_markdown
 from potto.ide.hover.local_names import TITLES, local_type
 from potto.ide.model import Completion, CompletionKind, Completions
-from potto.ide.names.documents import definition_head, documentation, type_text, written_kind, written_kinds
+from potto.ide.names.descriptions import definition_head, documentation, type_text, written_kind, written_kinds
+from potto.ide.names.keywords import KEYWORDS, LETTERS, SPECIALS, TYPES, Keyword
 from potto.ide.names.places import Site, chunk_at, owner, site_after, site_at
 from potto.ide.names.symbols import LocalSymbol
-from potto.ide.names.words import KEYWORDS, LETTERS, SPECIALS, TYPES, Keyword
 from potto.measures import COMPOSITIONS, MEASURES, Measure
 from potto.measures.composed import Composition
 from potto.modules import DefinitionTarget, ModuleTarget, resolve

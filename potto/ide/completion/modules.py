@@ -7,10 +7,10 @@ from collections.abc import Iterator
 
 from msgspec.structs import replace
 
-from potto.ide.completion.fields import part_items
+from potto.ide.completion.parts_of_values import part_items
 from potto.ide.completion.place import CompletionPlace
 from potto.ide.model import Completion
-from potto.ide.names.documents import written_kind
+from potto.ide.names.descriptions import written_kind
 from potto.ide.names.places import Site
 from potto.modules import DefinitionTarget, ModuleTarget, find_module, names, resolve, resolve_module
 from potto.modules.graph import owner

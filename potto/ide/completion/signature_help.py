@@ -8,16 +8,16 @@ from __future__ import annotations
 
 from msgspec import Struct
 
-from potto.ide.completion.forms import form_help, signature
+from potto.ide.completion.form_help import form_help, signature
 from potto.ide.completion.pending_calls import PendingCall, call_at, juxtaposed_at
 from potto.ide.hover.hovers import typed_parameters
 from potto.ide.hover.local_names import local_type
 from potto.ide.model import ParameterText, Signature, SignatureHelp
-from potto.ide.names.documents import documentation
+from potto.ide.names.descriptions import documentation
 from potto.ide.names.index import call_head
+from potto.ide.names.keywords import SPECIALS
 from potto.ide.names.places import ChunkAt, chunk_at
 from potto.ide.names.symbols import LocalSymbol, callee
-from potto.ide.names.words import SPECIALS
 from potto.measures import COMPOSITIONS, MEASURES
 from potto.modules import resolve
 from potto.primitives import PRIMITIVES

@@ -12,9 +12,9 @@ from msgspec.structs import replace
 
 from potto.ide.hover.derivatives import derivative_text
 from potto.ide.model import CodeLens, Offer
-from potto.ide.names.documents import Kind, kind_of, name_span, written_kind
+from potto.ide.names.descriptions import Kind, kind_of, name_span, written_kind
+from potto.ide.names.live_points import points
 from potto.ide.names.places import PieceAt, pieces_of
-from potto.ide.names.points import points
 from potto.ide.names.symbols import DefinitionSymbol
 from potto.ide.navigation.references import occurrences_of
 from potto.query import Database, query

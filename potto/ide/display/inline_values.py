@@ -6,7 +6,7 @@ Owns `inline_values`. Numbers are for who evaluates; here only the places and th
 from __future__ import annotations
 
 from potto.ide.model import InlineValue
-from potto.ide.names.documents import kind_of
+from potto.ide.names.descriptions import kind_of
 from potto.ide.names.places import all_chunks, owner
 from potto.query import Database
 from potto.source import Span

@@ -9,8 +9,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from potto.ide.model import SemanticToken
-from potto.ide.names.documents import written_kind
+from potto.ide.names.descriptions import written_kind
 from potto.ide.names.index import BoundName, Occurrence
+from potto.ide.names.keywords import SPECIALS, TYPES
 from potto.ide.names.parts import is_part, occurrences
 from potto.ide.names.places import ChunkAt, all_chunks, owner
 from potto.ide.names.symbols import (
@@ -23,7 +24,6 @@ from potto.ide.names.symbols import (
     meaning_of,
     placeless,
 )
-from potto.ide.names.words import SPECIALS, TYPES
 from potto.modules import is_diffeo
 from potto.query import Database, query
 from potto.source import Span

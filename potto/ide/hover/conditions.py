@@ -19,7 +19,7 @@ from potto.ide.names.places import ChunkAt
 from potto.query import Database
 from potto.source import Span
 from potto.syntax import extent, node_at, nodes
-from potto.syntax.written import without_parentheses
+from potto.syntax.as_written import without_parentheses
 from potto.types.kinds import VARYING_CONDITION
 
 RULE = "\n\n---\n\n"

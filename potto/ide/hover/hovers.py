@@ -27,7 +27,8 @@ from potto.ide.hover.derivatives import (
 )
 from potto.ide.hover.local_names import local_markdown
 from potto.ide.model import Hover
-from potto.ide.names.documents import definition_head, documentation, module_documentation
+from potto.ide.names.descriptions import definition_head, documentation, module_documentation
+from potto.ide.names.keywords import KEYWORDS, SPECIALS, TYPES
 from potto.ide.names.places import ChunkAt, chunk_at, owner, word_at
 from potto.ide.names.symbols import (
     BuiltinSymbol,
@@ -39,7 +40,6 @@ from potto.ide.names.symbols import (
     Symbol,
     symbol_at,
 )
-from potto.ide.names.words import KEYWORDS, SPECIALS, TYPES
 from potto.measures import COMPOSITIONS, MEASURES, Measure
 from potto.measures.composed import Composition
 from potto.modules import definition, names

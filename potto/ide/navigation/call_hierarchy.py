@@ -8,7 +8,7 @@ from __future__ import annotations
 import os.path
 
 from potto.ide.model import CallItem, HierarchyCall, Location
-from potto.ide.names.documents import kind_of, type_text
+from potto.ide.names.descriptions import kind_of, type_text
 from potto.ide.names.places import ChunkAt, chunk_at, owner
 from potto.ide.names.symbols import DefinitionSymbol, home, meaning_of, symbol_at
 from potto.ide.navigation.references import occurrences_of

@@ -9,7 +9,7 @@ import os.path
 
 from potto.ide.actions.imports import exports
 from potto.ide.model import DocumentSymbol, Location, SymbolKind, WorkspaceSymbol
-from potto.ide.names.documents import item_span, name_span, type_text, written_kind
+from potto.ide.names.descriptions import item_span, name_span, type_text, written_kind
 from potto.ide.names.index import BoundName
 from potto.ide.names.places import ChunkAt, PieceAt, pieces_of
 from potto.ide.names.symbols import placeless

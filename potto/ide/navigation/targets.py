@@ -11,7 +11,7 @@ import re
 
 from potto.data.mistakes import DataMistake
 from potto.ide.model import Links, Location
-from potto.ide.names.documents import item_span, name_span
+from potto.ide.names.descriptions import item_span, name_span
 from potto.ide.names.places import ChunkAt, chunk_at, chunks_with
 from potto.ide.names.symbols import DefinitionSymbol, FoundName, LocalSymbol, ModuleSymbol, PartSymbol, symbol_at
 from potto.modules import DefinitionTarget, dependencies, references, resolve, resolve_member, source

@@ -34,8 +34,8 @@ from potto_repl.expressions import call_of, checked
 from potto_repl.registry import command
 from potto_repl.reply import Part, Refusal, diagnostic
 from potto_repl.session import Conversation, plain_names
+from potto_repl.shown_values import is_dual, parts_of, tail, value_parts
 from potto_repl.slopes import all_slopes
-from potto_repl.values import is_dual, parts_of, tail, value_parts
 
 TOLERANCES = (1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12)
 SAMPLES = (1_000, 10_000, 100_000)

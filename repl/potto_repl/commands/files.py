@@ -8,7 +8,7 @@ from potto.extras import install_command
 from potto.modules.texts import chunk_text
 from potto.reports.render import display_name
 from potto_repl.following import bring, refreshed
-from potto_repl.records import prompted
+from potto_repl.recordings import prompted
 from potto_repl.registry import command
 from potto_repl.reply import Part, Refusal, answer, note
 from potto_repl.session import Conversation

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from potto.reports.render import broken
-from potto_repl.registry import COMMANDS, Command, command, find
+from potto_repl.registry import COMMANDS, PromptCommand, command, find
 from potto_repl.reply import Part
 from potto_repl.session import Conversation
 
@@ -32,7 +32,7 @@ def show_help(session: Conversation, text: str) -> Part:
     return Part("answer", INTRODUCTION + "\n" + "\n".join(rows), {"commands": listed}, prose=True)
 
 
-def _row(entry: Command, columns: int) -> list[str]:
+def _row(entry: PromptCommand, columns: int) -> list[str]:
     """A command and what it does, side by side where there is room for that."""
     beside = min(USAGE, columns // 3) if columns >= NARROW else 6
     summary = broken(entry.summary, max(columns - beside, 12), 0).split("\n")

@@ -12,11 +12,11 @@ import re
 from collections.abc import Iterable, Iterator
 from typing import TextIO
 
+from potto_repl.backslash_symbols import readable
 from potto_repl.paint import Screen, painted
 from potto_repl.reply import Part
 from potto_repl.respond import stream
 from potto_repl.session import Conversation
-from potto_repl.symbols import readable
 
 PIPE = Screen(answers=False)
 _ALONE = re.compile(r":|\S+\?{1,2}\s*$")

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 
 from potto.runtime.answers.rich import rows_html, rows_latex
 from potto_repl.reply import Part
-from potto_repl.script import entries
+from potto_repl.without_terminal import entries
 
 _NAMED = re.compile(r"_[0-9]* = ")
 _MISSED = "not converged"

@@ -7,7 +7,7 @@ from typing import Any
 from potto import ide
 from potto_lsp import convert, protocol
 from potto_lsp.asking import Ask
-from potto_lsp.errors import InvalidParams
+from potto_lsp.failures import InvalidParams
 from potto_lsp.features.outlines import KINDS
 
 

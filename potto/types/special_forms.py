@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from potto.syntax import nodes
-from potto.syntax.written import without_parentheses
+from potto.syntax.as_written import without_parentheses
 from potto.types import kinds
 from potto.types.context import Inference
 from potto.types.infer import is_known

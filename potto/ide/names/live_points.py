@@ -9,14 +9,14 @@ from collections.abc import Iterator, Mapping
 
 from msgspec import Struct
 
-from potto.ide.names.documents import kind_of
+from potto.ide.names.descriptions import kind_of
 from potto.ide.names.function_arguments import fits, numbers
 from potto.ide.names.symbols import callee
 from potto.modules import is_diffeo, names, parsed
 from potto.modules.texts import groups_of_pieces, piece
 from potto.query import Database, query
 from potto.syntax import children, live_expressions, nodes, parse_expression
-from potto.syntax.written import without_parentheses
+from potto.syntax.as_written import without_parentheses
 from potto.types import Function, Parameter, Real, TupleOf, Type, TypeVariable, groups_of, interface, result_of
 from potto.types.types import resolve
 

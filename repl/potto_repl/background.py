@@ -8,7 +8,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 
-from potto_repl.loading import Loader
+from potto_repl.session_loading import Loader
 
 PAUSE = 0.2  # seconds without a key before a text is checked
 
@@ -69,7 +69,7 @@ class Checker:
     def _marks(self, text: str) -> tuple[Mark, ...] | None:
         from potto.query import Cancelled
         from potto.syntax import completeness
-        from potto_repl.symbols import readable
+        from potto_repl.backslash_symbols import readable
 
         if not text.strip() or text.lstrip().startswith(":") or text.rstrip().endswith("?") or readable(text) != text:
             return ()

@@ -9,7 +9,7 @@ from potto.query import Database, query
 from potto.source import Span
 from potto_lsp import protocol
 from potto_lsp.asking import Ask
-from potto_lsp.features.whole import PieceItems, part_of, whole
+from potto_lsp.features.by_piece import PieceItems, part_of, whole
 from potto_lsp.text import DocumentText
 from potto_lsp.wire import Encoded
 

@@ -12,9 +12,9 @@ from potto.ide.names.places import PieceAt
 from potto.modules import chunk_text
 from potto.query import Database, query
 from potto_lsp.asking import Ask
-from potto_lsp.colouring import Colours, Words, edits
+from potto_lsp.colouring import Colours, TokenNumbers, edits
 from potto_lsp.features import TOKEN_MODIFIERS, TOKEN_TYPES
-from potto_lsp.features.whole import lined
+from potto_lsp.features.by_piece import lined
 from potto_lsp.text import DocumentText, Encoding
 from potto_lsp.wire import Encoded
 
@@ -38,7 +38,7 @@ def delta(ask: Ask) -> dict[str, Any] | Encoded:
 
 def _remember(ask: Ask) -> Colours:
     """The colours of a file, put together from those of its pieces."""
-    parts: list[Words] = []
+    parts: list[TokenNumbers] = []
     below: list[int] = []
     before, encoding = 0, ask.text.encoding
     for at, line in lined(ask):
@@ -58,7 +58,7 @@ def in_range(ask: Ask) -> dict[str, Any]:
 
 
 @query(keep=1024)
-def _of_piece(db: Database, file: str, text: str, hidden: tuple[str, ...], encoding: Encoding) -> Words:
+def _of_piece(db: Database, file: str, text: str, hidden: tuple[str, ...], encoding: Encoding) -> TokenNumbers:
     """The words of a piece as numbers, as if it stood at the head of its file: those of its chunks, one behind the
     other."""
     found: list[int] = []
@@ -76,23 +76,23 @@ def _of_piece(db: Database, file: str, text: str, hidden: tuple[str, ...], encod
             found.append(line + part.numbers[0] - before)
             found += part.numbers[1:]
             before = line + part.last
-    return Words(before, tuple(found))
+    return TokenNumbers(before, tuple(found))
 
 
 @query
-def _of_definition(db: Database, file: str, name: str, encoding: Encoding) -> Words:
+def _of_definition(db: Database, file: str, name: str, encoding: Encoding) -> TokenNumbers:
     """The words of a definition as numbers, as if it stood at the beginning of its file."""
     return _numbers(DocumentText(chunk_text(db, file, name) or "", encoding), definition_words(db, file, name))
 
 
 @query(keep=8192)
-def _of_the_rest(db: Database, file: str, text: str, encoding: Encoding) -> Words:
+def _of_the_rest(db: Database, file: str, text: str, encoding: Encoding) -> TokenNumbers:
     """Those of a chunk that defines nothing."""
     return _numbers(DocumentText(text, encoding), loose_words(db, file, text))
 
 
-def _numbers(text: DocumentText, words: Iterable[Word], start: int = 0) -> Words:
-    """Words as numbers, counted from `start` of a text."""
+def _numbers(text: DocumentText, words: Iterable[Word], start: int = 0) -> TokenNumbers:
+    """TokenNumbers as numbers, counted from `start` of a text."""
     found: list[int] = []
     before_line = before_column = 0
     for first, last, type, modifiers in words:
@@ -103,4 +103,4 @@ def _numbers(text: DocumentText, words: Iterable[Word], start: int = 0) -> Words
         bits = sum([_MODIFIERS[name] for name in modifiers])
         found += (line - before_line, column - before_column, length, _TYPES[type], bits)
         before_line, before_column = line, column
-    return Words(before_line, tuple(found))
+    return TokenNumbers(before_line, tuple(found))

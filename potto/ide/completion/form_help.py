@@ -5,11 +5,11 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-from potto.ide.completion.fields import changed_at, whole_type
+from potto.ide.completion.parts_of_values import changed_at, whole_type
 from potto.ide.completion.place import operand_start
 from potto.ide.model import ParameterText, Signature, SignatureHelp
+from potto.ide.names.keywords import KEYWORDS
 from potto.ide.names.places import site_at
-from potto.ide.names.words import KEYWORDS
 from potto.query import Database
 from potto.source import Span
 from potto.types import TupleOf, format_type

@@ -16,12 +16,12 @@ from potto.reports.render import display_name
 from potto.syntax import nodes, print_expression
 from potto.types import format_type, interface
 from potto.types.types import Diffeo, Function
+from potto_repl.backslash_symbols import pretty
 from potto_repl.documentation import documentation, documented
 from potto_repl.expressions import Asked, checked, without_parens
 from potto_repl.registry import COMMANDS, command
 from potto_repl.reply import Part, Refusal, answer
 from potto_repl.session import Conversation
-from potto_repl.symbols import pretty
 
 UNNAMED = "it"  # what a function without a name is called
 

@@ -20,7 +20,7 @@ from msgspec import Struct
 
 from potto.digests import blake2b
 from potto.query.database import Database
-from potto.query.nodes import GONE, Input, MappingEntry, Memo, Node, Query, entry_of, same
+from potto.query.memos import GONE, Input, MappingEntry, Memo, Node, Query, entry_of, same
 
 Args = tuple[Hashable, ...]
 Asked = tuple[Callable[..., Any], Args]  # a query and what it is asked about

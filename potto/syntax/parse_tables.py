@@ -1,4 +1,4 @@
-"""The LALR tables of the grammar: computed by lark when the grammar is changed, and read from `tables.json` beside it.
+"""The LALR tables of the grammar: computed by lark when the grammar is changed, and read from `parse_tables.json`.
 
 Owns `Tables`, `tables()`, and `write`, which makes the file: `make tables`. lark is imported only where the
 file is not that of the grammar, while the grammar is worked on: importing it and computing costs a cold start more than
@@ -17,7 +17,7 @@ from typing import Any
 from msgspec import Struct
 
 STARTS = ("chunk", "expression")
-FILE = Path(__file__).with_name("tables.json")
+FILE = Path(__file__).with_name("parse_tables.json")
 
 
 class Production(Struct, frozen=True):

@@ -56,7 +56,7 @@ class Parted(Struct, frozen=True):
 
 class Query:
     """A declared query: its function and name, its fallback in a cycle, how many memos to `keep` (0: all), whether its
-    answers travel to other databases (see `travel`), and whether most edits below it leave its answer alone (`cuts`).
+    answers travel to other databases (see `parcels`), and whether most edits below it leave its answer alone (`cuts`).
     """
 
     __slots__ = ("cuts", "fallback", "function", "keep", "name", "travels")
