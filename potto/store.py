@@ -325,18 +325,21 @@ def _judged(folder: str) -> tuple[str | None, str | None]:
     Looked at once in a process: it is the user's own from then on.
     """
     folder = os.path.abspath(folder)
+    shared = sys.platform != "win32"  # where a user's folders are the user's own
     try:
-        os.makedirs(os.path.dirname(folder), mode=0o700, exist_ok=True)
-        with suppress(FileExistsError):
-            os.mkdir(folder, 0o700)
-        status = os.lstat(folder)
+        others = _open_around(folder) if shared else None
+        if others is None:  # where it would be refused, nothing is made
+            os.makedirs(os.path.dirname(folder), mode=0o700, exist_ok=True)
+            with suppress(FileExistsError):
+                os.mkdir(folder, 0o700)
+            if not stat.S_ISDIR(os.lstat(folder).st_mode):
+                return (
+                    None,
+                    f"nothing is kept between runs: {folder} is not a folder; delete it, or set POTTO_CACHE=off",
+                )
+            others = _open_within(folder) if shared else None
     except OSError:
         return None, None
-    if not stat.S_ISDIR(status.st_mode):
-        return None, f"nothing is kept between runs: {folder} is not a folder; delete it, or set POTTO_CACHE=off"
-    if sys.platform == "win32":  # where a user's folders are the user's own
-        return folder, None
-    others = _open_to_others(folder)
     if others is None:
         return folder, None
     advice = f"chmod go-w {others}" if os.stat(others).st_uid == os.getuid() else "set POTTO_CACHE to a folder of yours"
@@ -350,18 +353,24 @@ def _not_written(folder: str) -> str | None:
     return f"nothing is kept between runs: {folder} cannot be made or written"
 
 
-def _open_to_others(folder: str) -> str | None:
-    """The folder, of this one, those in it and those around it, by which somebody else could put something into it.
-
-    Around it, what others can write must be sticky, as /tmp is; its group is the user alone on most systems.
-    """
+def _open_within(folder: str) -> str | None:
+    """The folder, of this one and those in it, that is somebody else's or that others can write."""
     for path, status in ((folder, os.stat(folder)), *_within(folder)):
         if status.st_uid != os.getuid() or status.st_mode & 0o022:
             return path
+    return None
+
+
+def _open_around(folder: str) -> str | None:
+    """The folder around this one by which somebody else could put another in its place.
+
+    What others can write must be sticky, as /tmp is; its group is the user alone on most systems.
+    """
     around = os.path.realpath(folder)
     while (parent := os.path.dirname(around)) != around:
         around = parent
-        mode = os.stat(around).st_mode
-        if mode & stat.S_IWOTH and not mode & stat.S_ISVTX:
-            return around
+        with suppress(FileNotFoundError):  # what is to be made will be the user's own
+            mode = os.stat(around).st_mode
+            if mode & stat.S_IWOTH and not mode & stat.S_ISVTX:
+                return around
     return None

@@ -183,7 +183,7 @@ class TestFolder:
         folder.mkdir()
         folder.chmod(0o777)
         store.put("text", b"a", b"1")
-        assert not files(folder) and f"chmod go-w {folder}" in str(store.complaint())
+        assert not list(folder.iterdir()) and f"chmod go-w {folder}" in str(store.complaint())
         folder.chmod(0o1777)  # as /tmp: others can add, but neither rename nor delete what is not theirs
         store._judged.cache_clear()
         store.put("text", b"a", b"1")

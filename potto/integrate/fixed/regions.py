@@ -56,31 +56,32 @@ def _all_over(plan: StraightIntegral, of_parameters: Mapping[str, Interval]) -> 
     choices = enclosure(tuple([choice for choice, _ in plan.held]), box)
     if any(low != side or high != side for (low, high), (_, side) in zip(choices, plan.held, strict=True)):
         return None
-    cells: list[Stretch] = []
+    return _over(plan, box, 0, ())
 
-    def over(i: int, path: Path) -> bool:
-        if i == len(plan.variables):
-            sides = enclosure(children(plan.surfaces.body), box)
-            if any(not (lo > 0 or hi < 0) for lo, hi in sides):
-                return False
-            face = plan.face(tuple(bool(lo > 0) for lo, _ in sides))
-            if not (isinstance(face, Const) and face.value == 0):
-                cells.append(Stretch(path, face))
-            return True
-        ends = enclosure(plan.items[i], box)
-        (a0, a1), (b0, b1) = ends[:2]
-        gap = APART * (b1 - a0)
-        rows = ((lo, hi, row) for row, (lo, hi) in enumerate(ends[2:], 2))
-        kept = [(a0, a1, 0), *sorted(r for r in rows if not (r[1] < a0 - gap or r[0] > b1 + gap)), (b0, b1, 1)]
-        if any(not (b[0] - a[1] > gap) for a, b in itertools.pairwise(kept)):
-            return False
-        for a, b in itertools.pairwise(kept):
-            box[plan.variables[i]] = (0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1]))
-            if not over(i + 1, (*path, (a[2], b[2]))):
-                return False
-        return True
 
-    return tuple(cells) if over(0, ()) else None
+def _over(plan: StraightIntegral, box: dict[str, Interval], i: int, path: Path) -> tuple[Stretch, ...] | None:
+    """The same from the i-th variable on, within the stretches of a path; those of the variables are put into `box`."""
+    if i == len(plan.variables):
+        sides = enclosure(children(plan.surfaces.body), box)
+        if any(not (lo > 0 or hi < 0) for lo, hi in sides):
+            return None
+        face = plan.face(tuple(bool(lo > 0) for lo, _ in sides))
+        return () if isinstance(face, Const) and face.value == 0 else (Stretch(path, face),)
+    ends = enclosure(plan.items[i], box)
+    (a0, a1), (b0, b1) = ends[:2]
+    gap = APART * (b1 - a0)
+    rows = ((lo, hi, row) for row, (lo, hi) in enumerate(ends[2:], 2))
+    kept = [(a0, a1, 0), *sorted(r for r in rows if not (r[1] < a0 - gap or r[0] > b1 + gap)), (b0, b1, 1)]
+    if any(not (b[0] - a[1] > gap) for a, b in itertools.pairwise(kept)):
+        return None
+    cells: tuple[Stretch, ...] = ()
+    for a, b in itertools.pairwise(kept):
+        box[plan.variables[i]] = (0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1]))
+        further = _over(plan, box, i + 1, (*path, (a[2], b[2])))
+        if further is None:
+            return None
+        cells += further
+    return cells
 
 
 def region_of(
