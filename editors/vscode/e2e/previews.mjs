@@ -3,17 +3,16 @@ import { existsSync, readFileSync, readdirSync, readlinkSync, statSync } from "n
 import { join } from "node:path";
 import assert from "node:assert/strict";
 import { until } from "./waiting.mjs";
-import { EDITOR, frameOf, pixels, preview, settledAfter } from "./window.mjs";
+import { EDITOR, frameOf, pixels, preview, redrawnAfter, settledAfter, showPreview } from "./window.mjs";
 
 export const PREVIEWS = {
   async "the preview shows the value and its derivative"({ page, picture, go }) {
     await go(4, 6);
-    await page.keyboard.press("Control+K");
-    await page.keyboard.press("v");
-    const frame = await preview(page);
+    await showPreview(page, "renderer.po");
+    const frame = frameOf(page);
+    const told = /160 × 160 · .* ms .* error ≤ .*of the derivative ≤ .* evaluations/;
+    await frame.locator("#status[data-settled=true]", { hasText: told }).waitFor();
     assert.equal(await frame.locator("canvas").count(), 2);
-    const status = await frame.locator("#status").innerText();
-    assert.match(status, /160 × 160 · .* ms .* error ≤ .*of the derivative ≤ .* evaluations/);
     for (const id of ["value", "slope"]) {
       const colours = Number((await pixels(frame.locator(`#${id}`))).split(" ")[2]);
       assert.ok(colours > 10, `${id} has ${colours} colours`);
@@ -75,12 +74,10 @@ export const PREVIEWS = {
 
   async "the preview follows the text, and says what is wrong with it"({ page, picture, command }) {
     const frame = await preview(page);
-    const before = await pixels(frame.locator("#value"));
     const word = page.locator(`${EDITOR} .view-line`, { hasText: "0.8*ball" }).first();
     await word.click();
     await page.keyboard.press("Home");
-    await settledAfter(frame, () => page.keyboard.type("(1 - x)*"));
-    assert.notEqual(await pixels(frame.locator("#value")), before);
+    await redrawnAfter(frame, () => page.keyboard.type("(1 - x)*"));
     await page.keyboard.press("Home");
     await page.keyboard.type("missing*");
     await frame.locator("#problem", { hasText: "missing" }).waitFor();
@@ -121,9 +118,7 @@ export const PREVIEWS = {
 
   async "a function that a function needs is found, or asked for"({ page, picture, file }) {
     await file("shaded.po");
-    await page.keyboard.press("Control+K");
-    await page.keyboard.press("v");
-    await page.locator(".tab.active", { hasText: "Preview shaded.po" }).waitFor();
+    await showPreview(page, "shaded.po");
     const frame = await preview(page);
     await frame.locator("main.curves").waitFor();
     assert.equal(await frame.locator("#p-shader").inputValue(), "lin");
@@ -142,8 +137,7 @@ export const PREVIEWS = {
 
   async "a slow preview holds up nothing"({ page, file, command }) {
     await file("slow.po");
-    await page.keyboard.press("Control+K");
-    await page.keyboard.press("v");
+    await showPreview(page, "slow.po");
     const frame = frameOf(page);
     await frame.locator("#function option", { hasText: "slow" }).waitFor({ state: "attached" });
     await page.locator(`${EDITOR} .view-line`, { hasText: "def slow" }).first().click();
@@ -177,8 +171,7 @@ export const PREVIEWS = {
     await frame.locator("#function option", { hasText: "pixel" }).waitFor({ state: "attached" });
     await frame.locator("#function").selectOption("pixel");
     await frame.locator("main.images").waitFor();
-    const { data } = await preview(page).then((settled) => settled.locator("#status").evaluate(({ dataset }) => ({ data: dataset.count })));
-    assert.equal(data, "160");
+    await frame.locator('#status[data-settled=true][data-count="160"]').waitFor();
     for (const id of evaluations(code.workspace)) process.kill(id, "SIGKILL"); // at rest, nobody sees that
     await settledAfter(frame, () => frame.locator('input[data-parameter="c"]').press("ArrowRight"));
     await frame.locator("#problem").waitFor({ state: "hidden" });
@@ -189,9 +182,7 @@ export const PREVIEWS = {
 export const RENAMED = {
   async "a preview stays with a file that is renamed"({ page, file }) {
     await file("shapes.po");
-    await page.keyboard.press("Control+K");
-    await page.keyboard.press("v");
-    await page.locator(".tab.active", { hasText: "Preview shapes.po" }).waitFor();
+    await showPreview(page, "shapes.po");
     await preview(page);
     const row = page.locator(".explorer-folders-view .monaco-list-row", { hasText: "shapes.po" }).first();
     await row.click();

@@ -6,7 +6,7 @@ import { PREVIEWS, RENAMED } from "./previews.mjs";
 import { THEMES } from "./themes.mjs";
 import { VIEWS } from "./views.mjs";
 import { until } from "./waiting.mjs";
-import { EDITOR, frameOf, preview, windowOn } from "./window.mjs";
+import { EDITOR, frameOf, preview, showPreview, windowOn } from "./window.mjs";
 
 export async function uiTests(code, pictures, report, only) {
   const run = async (name, window, test) => {
@@ -60,8 +60,7 @@ const TESTS = {
 
   async "a preview of a program with an error says what is wrong, and follows when it is put right"({ page, picture, go }) {
     await go(1, 6);
-    await page.keyboard.press("Control+K");
-    await page.keyboard.press("v");
+    await showPreview(page, "broken.po");
     await frameOf(page).locator("#problem", { hasText: "P0301" }).waitFor();
     await picture("preview-of-error");
     await page.keyboard.press("Control+1");

@@ -1,7 +1,8 @@
 // A window as a person uses it: files, commands, places, pictures; and the page of a preview.
+import assert from "node:assert/strict";
 import { dirname, join } from "node:path";
 import { open, remote } from "./vscode.mjs";
-import { PATIENCE, still } from "./waiting.mjs";
+import { PATIENCE, still, until } from "./waiting.mjs";
 
 export const EDITOR = ".part.editor";
 
@@ -67,9 +68,26 @@ export const pixels = (canvas) =>
     return `${width}x${height} ${hash} ${new Set(new Uint32Array(data.buffer)).size}`;
   });
 
+/** Open the preview of a file that is being edited, by its keys: the editor has them once it is in focus. */
+export async function showPreview(page, name) {
+  await page.locator(`${EDITOR} .monaco-editor.focused`).first().waitFor();
+  await page.keyboard.press("Control+K");
+  await page.keyboard.press("v");
+  await page.locator(".tab", { hasText: `Preview ${name}` }).first().waitFor();
+}
+
+/** Change something in the page of a preview, and wait until what that asks for is drawn. */
 export async function settledAfter(frame, change) {
-  const before = await frame.locator("#status").innerText();
+  const before = await frame.locator("#status").getAttribute("data-asked");
   await change();
-  await frame.locator("#status").filter({ hasNotText: before }).waitFor();
+  await frame.locator(`#status[data-settled=true]:not([data-asked="${before}"])`).waitFor();
+}
+
+/** Change the text, and wait until the preview has drawn another picture of it. */
+export async function redrawnAfter(frame, change) {
+  const value = frame.locator("#value");
+  const before = await pixels(value);
+  await change();
+  assert.ok(await until(async () => (await pixels(value)) !== before), "the picture is as it was");
   await frame.locator("#status[data-settled=true]").waitFor();
 }

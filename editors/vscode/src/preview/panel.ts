@@ -86,26 +86,27 @@ class Preview {
   /** Follow the program. It may import other files: what did not change is computed anew, and drawn as it was. */
   private follow(): void {
     const programs = vscode.workspace.createFileSystemWatcher("**/*.{po,diffeo}");
-    const later = (): void => {
-      clearTimeout(this.timer);
-      this.timer = setTimeout(() => void this.refresh(), LATER);
-    };
     const unlessOpen = (uri: vscode.Uri): void => {
-      if (!vscode.workspace.textDocuments.some((document) => document.uri.toString() === uri.toString())) later();
+      if (!vscode.workspace.textDocuments.some((document) => document.uri.toString() === uri.toString())) this.later();
     };
     this.gone.push(
       programs,
       programs.onDidChange(unlessOpen),
       programs.onDidCreate(unlessOpen),
-      programs.onDidDelete(later),
+      programs.onDidDelete(() => this.later()),
       vscode.workspace.onDidChangeTextDocument((event) => {
         if (event.document.languageId === "potto" && event.contentChanges.length) void this.refresh();
       }),
       vscode.workspace.onDidRenameFiles(({ files }) => {
-        for (const { oldUri, newUri } of files) if (this.move(oldUri, newUri)) later();
+        for (const { oldUri, newUri } of files) if (this.move(oldUri, newUri)) this.later();
       }),
       { dispose: () => clearTimeout(this.timer) },
     );
+  }
+
+  private later(): void {
+    clearTimeout(this.timer);
+    this.timer = setTimeout(() => void this.refresh(), LATER);
   }
 
   /** A file, or a folder, has another name: whether it is ours. */
@@ -191,6 +192,7 @@ class Preview {
       const { code } = error as { code?: unknown };
       const outdated = source.token.isCancellationRequested || code === CONTENT_MODIFIED;
       this.send({ type: "failed", id, message: advised(messageOf(error)), outdated });
+      if (code === CONTENT_MODIFIED) this.later(); // a file that was closed, or opened, has not changed for an editor
     } finally {
       this.asked.delete(id);
       source.dispose();

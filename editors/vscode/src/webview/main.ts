@@ -182,7 +182,9 @@ function ask(again = false): void {
     }),
     view: seen, axes, wrt,
   };
-  sampler.want(wish, again);
+  if (!sampler.want(wish, again)) return;
+  status.dataset["settled"] = "false"; // what is told is of the picture before
+  status.dataset["asked"] = String(1 + Number(status.dataset["asked"] ?? 0));
 }
 
 interface Asked extends Wish {
@@ -213,7 +215,7 @@ function arrived(outcome: Outcome): void {
 }
 
 /** Time, error and evaluations, and what is missing to the accuracy that was asked for. */
-function tell({ samples, count, final, milliseconds }: Outcome, grid: Grid): void {
+function tell({ samples, count, final, milliseconds, tooLong }: Outcome, grid: Grid): void {
   const most = (field: Field | undefined): number =>
     Math.max(0, ...(field?.errors ?? []).map((errors) => errors.reduce((a, b) => (b > a && Number.isFinite(b) ? b : a), 0)));
   const size = grid.rows > 1 ? `${grid.columns} × ${grid.rows}` : `${grid.columns} points`;
@@ -224,6 +226,7 @@ function tell({ samples, count, final, milliseconds }: Outcome, grid: Grid): voi
     `${samples.evals.toLocaleString("en")} evaluations`,
     ...(samples.converged ? [] : [`not converged: ${samples.reasons.join("; ")}`]),
     ...(final ? [] : ["refining…"]),
+    ...(tooLong ? [`finer would take about ${short(tooLong / 1000, 1)} s`] : []),
   ];
   status.textContent = parts.join(" · ");
   status.classList.toggle("unsure", !samples.converged);

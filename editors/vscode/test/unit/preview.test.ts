@@ -51,14 +51,29 @@ test("a coarse pass goes on, and what is wanted then comes next", () => {
 test("a fine pass for something else is cancelled, and its answer ignored", async () => {
   const { sent, cancelled, shown, sampler } = harness();
   sampler.want(wish("a", [2, 4000]));
-  await new Promise((resolve) => setTimeout(resolve, 5)); // a place took about a millisecond: a fine pass takes hours
+  await new Promise((resolve) => setTimeout(resolve, 5)); // a place took about a millisecond, of a fine pass each does so
   sampler.samples(1, SAMPLES);
   sampler.want(wish("b", [2, 4000]));
   assert.deepEqual(cancelled, [2]);
-  assert.deepEqual(sent, ["1 a 2", "2 a 4000", "3 b 2"]);
+  assert.deepEqual(sent, ["1 a 2", "2 a 400", "3 b 2"]);
   sampler.samples(2, SAMPLES);
   sampler.failure(2, "cancelled", true);
   assert.deepEqual(shown, ["a 2"]);
+});
+
+test("a slow picture is as fine as it can be within a few seconds, and is done then", () => {
+  const { sent, shown, sampler } = harness();
+  const slow = (seconds: number): Samples => ({ ...SAMPLES, seconds, compileSeconds: 1 });
+  sampler.want(wish("a", [20, 56, 160]));
+  sampler.samples(1, slow(1.4)); // 0.4 s for 20 * 20 places, a millisecond each: 4000 of them are 63 * 63
+  sampler.samples(2, slow(4.136)); // as much for each of 56 * 56, and a finer one would have few more
+  assert.deepEqual(sent, ["1 a 20", "2 a 56"]);
+  assert.deepEqual(shown, ["a 20", "a 56 final"]);
+  assert.ok(sampler.settled);
+  sampler.want(wish("b", [20, 56, 160]));
+  sampler.samples(3, slow(1.8)); // two milliseconds each: 44 * 44
+  sampler.samples(4, slow(1.1936)); // less than was thought: 0.1 ms each
+  assert.deepEqual(sent.slice(2), ["3 b 20", "4 b 44", "5 b 56"]);
 });
 
 test("what failed is told once and tried again when it is asked for anew", () => {
