@@ -17,7 +17,7 @@ import pytest
 import potto
 from potto.integrate.fixed.cells import proved_shapes
 from potto.integrate.fixed.cells.product_rule import ProductRule
-from potto.integrate.fixed.lowered.cells import places_of
+from potto.integrate.fixed.lowered.cells import LoweredCells, places_of
 from potto.kernels.cells import Cell
 from potto.runtime.integration.methods import quadrature
 
@@ -39,14 +39,20 @@ def covered(answer: Any, value: Any, slope: Any, rtol: float = 1e-11) -> None:
 
 
 def rules(monkeypatch: pytest.MonkeyPatch) -> list[int]:
-    """Of each rule that is applied, to how many cells."""
-    cells, applied = list[int](), ProductRule.applied
+    """Of each rule that is applied, by numpy or by machine code, to how many cells."""
+    cells, applied, add = list[int](), ProductRule.applied, LoweredCells.add
 
     def counted(self: ProductRule, env: Any, index: Any) -> Any:
         cells.append(index.size)
         return applied(self, env, index)
 
+    def added(self: LoweredCells, function: Any, env: Any, members: Any, *others: Any) -> Any:
+        if others[-1] is not False:  # not a look at what would be added
+            cells.append(members.size)
+        return add(self, function, env, members, *others)
+
     monkeypatch.setattr(ProductRule, "applied", counted)
+    monkeypatch.setattr(LoweredCells, "add", added)
     return cells
 
 

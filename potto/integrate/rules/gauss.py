@@ -112,6 +112,13 @@ def _quarter(n: int) -> int:
     return max(n // 4, 2)
 
 
+def quarters(n: int) -> tuple[int, float, float]:
+    """Of how many coefficients a quarter of n is, and the powers of what one falls by to the next quarter that stand
+    for all that follow, and for the square of what neighbours fall by."""
+    w = _quarter(n)
+    return w, AHEAD * n / w, 2 / w
+
+
 def analytic_truncation(size: Array, n: int) -> Array:
     """The same for integrands that are known to be analytic beyond the ends of the piece, whose coefficients fall
     geometrically, though not one by one: quarters of them are compared, and the slower decay is followed for AHEAD

@@ -28,7 +28,7 @@ from potto.kernels.cells import Array, Bools, Cell, Ints, Value
 # Nodes per variable that are tried, one after the other.
 ORDERS = (6, 8, 12, 14, 20, 28)
 MOST_NODES = 4096
-# How many members are cut, and numbers kept at nodes or of coefficients, at once.
+# How many members are cut, and numbers kept at nodes, at once.
 MEMBERS, POINTS = 1 << 16, 1 << 15
 # How many members tell the order for all, where there are many, and for how many of them it must do.
 PILOTS = 16
@@ -186,10 +186,9 @@ def _applied(
 
 
 def _in_parts(rule: ProductRule, env: dict[str, Value], todo: Ints, total: Array, fine: Bools) -> Ints:
-    """The same for one rule, as many cells at a time as stay in the cache."""
-    step, left = max(1, POINTS // rule.span), []
-    if not rule.native:
-        todo = todo[in_rows(rule.cell.between.take(todo), len(rule.orders))]
+    """The same for one rule by numpy, as many cells at a time as stay in the cache."""
+    step, left = max(1, POINTS // rule.nodes), []
+    todo = todo[in_rows(rule.cell.between.take(todo), len(rule.orders))]
     for start in range(0, todo.size, step):
         index = todo[start : start + step]
         found, owners = rule.applied(env, index), rule.cell.members.take(index)

@@ -13,12 +13,13 @@ import numpy as np
 from msgspec import Struct
 from msgspec.structs import replace
 
-from potto.integrate.fixed.axes import MEAN, Raw, axis
+from potto.integrate.fixed.axes import MEAN, Axis, Raw, axis
 from potto.integrate.fixed.cells.nodes import at_once
 from potto.integrate.fixed.cells.topologies import Alike
-from potto.integrate.fixed.lowered.cells import LoweredCells, Run, Wanted, lowered_cells
-from potto.integrate.fixed.lowered.rule_text import RuleText
-from potto.integrate.fixed.lowered.total_text import ELSEWHERE, TRACKED, TotalText
+from potto.integrate.fixed.lowered.adding_text import ELSEWHERE, PARTS, TRACKED
+from potto.integrate.fixed.lowered.cells import Judged, Left, LoweredCells, Proved, Run, Wanted, lowered_cells
+from potto.integrate.fixed.lowered.judged_text import JudgedText
+from potto.integrate.fixed.lowered.total_text import TotalText
 from potto.integrate.fixed.moving_sums import SUMMED
 from potto.integrate.fixed.straight import StraightIntegral
 from potto.integrate.pieces import Evaluator
@@ -71,19 +72,6 @@ class ProductRule(Struct, frozen=True):
         return math.prod(self.orders)
 
     @property
-    def native(self) -> bool:
-        """Whether what nodes amount to is for machine code now, which of a rule that is known to do adds it up
-        itself."""
-        return not all(self.exact) and self.way.function(self.machine) is not None
-
-    @property
-    def span(self) -> int:
-        """How many numbers of a member are kept at a time: those at all nodes, or of coefficients alone."""
-        if not self.native:
-            return self.nodes
-        return sum(len(asked) for asked in self.asked)
-
-    @property
     def asked(self) -> list[tuple[int, ...]]:
         """Which coefficients are asked for along each variable."""
         those = (lambda order: tuple(range(order))) if self.skipped else telling
@@ -91,24 +79,43 @@ class ProductRule(Struct, frozen=True):
 
     def applied(self, env: dict[str, Value], index: Ints) -> Measured:
         """The integrals over some of the cells."""
-        return self._measured(self._raw(env, index, self.asked), index, *self.skipped, self.orders)
+        return self._measured(self._raw(env, index), index, *self.skipped, self.orders)
 
     def foreseen(self, env: dict[str, Value], index: Ints, others: Sequence[ProductRule]) -> Iterator[Bools]:
         """For which cells rules with no more nodes than this one would do, by its coefficients."""
-        raw = self._raw(env, index, replace(self, skipped=(self.orders,)).asked)
-        return (other.good(self._measured(raw, index, other.orders)) for other in others)
-
-    def _raw(self, env: dict[str, Value], index: Ints, asked: Sequence[tuple[int, ...]]) -> Raw:
+        whole = replace(self, skipped=tuple(other.orders for other in others))
+        function = self.way.function(self.machine)
+        if function is None:
+            raw = whole._raw(env, index)
+            return (other.good(self._measured(raw, index, other.orders)) for other in others)
         self.machine.count(index.size * self.nodes)
+        cells = self.cell.members.take(index), self.cell.between.take(index)
+        run = Run(whole.axes(index), 0, index.size, self._beside(index))
+        nowhere = np.zeros((PARTS + 1, 1 + self.machine.directions, int(cells[0].max()) + 1))
+        asked = Wanted(*self._parts, False), whole.judged(*whole.skipped)
+        return iter(self.way.add(function, env, *cells, [run], *asked, nowhere, False)[1:])
+
+    def left(self, index: Ints) -> Left:
+        """How it is known what this rule leaves out of some cells."""
+        if all(self.exact):
+            return Proved(None if self.beyond is None else self.beyond.take(index, 1))
+        return self.judged(*self.skipped, self.orders)
+
+    def judged(self, *orders: tuple[int, ...]) -> Judged:
+        """What these orders have of its coefficients."""
+        return Judged(orders, self.orders, tuple(map(len, self.asked)))
+
+    def axes(self, index: Ints) -> list[Axis]:
+        """The nodes along each variable, for some cells."""
         turning = [STRAIGHT if exact else ends for exact, ends in zip(self.exact, self.cell.turning, strict=True)]
-        given, several = zip(self.orders, asked, turning, strict=True), self._several(index)
-        axes = [axis(order, own, ends, several) for order, own, ends in given]
+        several = self._several(index)
+        return [axis(*own, several) for own in zip(self.orders, self.asked, turning, strict=True)]
+
+    def _raw(self, env: dict[str, Value], index: Ints) -> Raw:
+        self.machine.count(index.size * self.nodes)
         members, between = self.cell.members.take(index), self.cell.between.take(index)
-        function = None if all(self.exact) else self.way.function(self.machine)
-        if function is not None:
-            return self.way.run(function, env, members, between, axes, self.machine.directions)
         with self.way.promotion.by_numpy():
-            return at_once(self.plan, self.cell.face, self.machine, env, members, between, axes)
+            return at_once(self.plan, self.cell.face, self.machine, env, members, between, self.axes(index))
 
     def _several(self, index: Ints) -> bool:
         """Whether there are so many nodes that rounding is followed at few of them."""
@@ -153,29 +160,29 @@ class ProductRule(Struct, frozen=True):
 def way_of(
     plan: StraightIntegral, cell: Alike, exact: Sequence[bool], machine: Evaluator, env: dict[str, Value]
 ) -> LoweredCells:  # fmt: skip
-    """How machine code does rules for these cells: with totals of members where it is known that nodes are enough."""
-    return lowered_cells(plan, cell.face, machine.directions, env, TotalText if all(exact) else RuleText)
+    """How machine code does rules for these cells."""
+    return lowered_cells(plan, cell.face, machine.directions, env, TotalText if all(exact) else JudgedText)
 
 
 def added_together(
     rules: Sequence[tuple[ProductRule, Ints]], env: dict[str, Value], total: Array
 ) -> tuple[Ints, Bools] | None:  # fmt: skip
     """Add the integrals over some cells to those of their members, by machine code: which cells, and which of them were
-    good enough. None where that is left to numpy, or coefficients tell.
+    good enough. None where that is left to numpy.
 
-    rules: of cells of one shape, each with those that it is for. total: (4, 1 + k, B), as of what is `Measured`.
+    rules: of cells of one shape, each with those that it is for; several only where it is proved what they leave out.
+    total: (4, 1 + k, B), as of what is `Measured`.
     """
     first, index = rules[0][0], rules[0][1] if len(rules) == 1 else np.concatenate([own for _, own in rules])
     function = first.way.function(first.machine)
-    if function is None or not all(first.exact):
+    if function is None:
         return None
     first.machine.count(sum(rule.nodes * own.size for rule, own in rules))
     runs, start = [], 0
     for rule, own in rules:
-        axes = [axis(order, MEAN, STRAIGHT, rule._several(own)) for order in rule.orders]
-        runs.append(Run(axes, start, start + own.size, rule._beside(own)))
+        runs.append(Run(rule.axes(own), start, start + own.size, rule._beside(own)))
         start += own.size
     wanted = Wanted(*first._parts, index.size <= FEW)
     members, between = first.cell.members.take(index), first.cell.between.take(index)
-    beyond = None if first.beyond is None else first.beyond.take(index, 1)
-    return index, first.way.add(function, env, members, between, runs, wanted, beyond, total)
+    left = first.left(index)
+    return index, first.way.add(function, env, members, between, runs, wanted, left, total)[0]

@@ -291,11 +291,6 @@ class BoxText(BoxMeans):
         """The larger without regard to sign."""
         return self.at.apply("max", self.at.apply("abs", x), self.at.apply("abs", y))
 
-    def greater(self, x: str, y: str) -> str:
-        """The greater one; of a number and what is none, the number."""
-        at = self.at
-        return at.apply("select", at.apply("gt", x, y), x, at.apply("select", at.apply("eq", y, y), y, x))
-
 
 def rows_of(channels: int) -> int:
     """How many rows of results there are of so many numbers."""

@@ -3,8 +3,8 @@
 Owns `LoweredCells`, and `frame_of` and `places_of`, which tell such functions what they work on. A function goes
 through the members eight at a time. In loops over the nodes of the variables, from the outermost to the innermost, it
 works out bounds, cuts, nodes and the integrand, and adds up Legendre coefficients on the way back: what numpy does to
-whole arrays, one after the other, is done here to eight numbers that stay in registers. Where nothing is left to be
-decided beside it, what is found is added to the sums of members there as well.
+whole arrays, one after the other, is done here to eight numbers that stay in registers. What is found is added to the
+sums of members where it is good enough.
 """
 
 from __future__ import annotations
@@ -19,12 +19,14 @@ from msgspec import Struct
 from numpy.typing import NDArray
 
 from potto.core.terms import Term, postorder
-from potto.integrate.fixed.axes import Axis, Raw
+from potto.integrate.fixed.axes import Axis
+from potto.integrate.fixed.lowered.adding_text import BESIDE, PARTS
 from potto.integrate.fixed.lowered.formula_text import ONE, ParameterPlace
+from potto.integrate.fixed.lowered.judged_text import QUARTERS
 from potto.integrate.fixed.lowered.rule_text import NAME, RuleText
-from potto.integrate.fixed.lowered.total_text import BESIDE
 from potto.integrate.fixed.straight import StraightIntegral
 from potto.integrate.pieces import Evaluator
+from potto.integrate.rules.gauss import quarters
 from potto.kernels.cells import Array, Bools, Cell, Ints, Value
 from potto.kernels.making import counts
 from potto.kernels.native.objects import Loaded
@@ -59,11 +61,61 @@ class Run(Struct, frozen=True):
     beside: float
 
 
+class Proved(Struct, frozen=True):
+    """What is known beforehand to be left out of each cell, (1 + k, M); None: nothing."""
+
+    beyond: Array | None
+    looks = 0
+
+    @property
+    def told(self) -> bool:
+        """Whether that goes into the sums."""
+        return self.beyond is not None
+
+    def columns(self, least: int) -> list[Array]:
+        return [] if self.beyond is None else [whole(row, least) for row in self.beyond]
+
+    def behind(self, columns: Sequence[Array], at: slice) -> list[int]:
+        return [address(row[at]) for row in columns]
+
+
+class Judged(Struct, frozen=True):
+    """What is left out of a cell is told by coefficients, as rules of these orders have them: the least of it counts.
+
+    asked: how many coefficients there are along each variable, which are its last ones; 1 of a polynomial.
+    """
+
+    orders: Sequence[tuple[int, ...]]
+    nodes: tuple[int, ...]
+    asked: tuple[int, ...]
+    told = True
+
+    @property
+    def looks(self) -> int:
+        return len(self.orders)
+
+    def columns(self, least: int) -> list[NDArray[Any]]:
+        """The tables of what is looked at."""
+        places, powers = np.zeros((2, self.looks, len(self.nodes), 2))
+        for own, row, pair in zip(self.orders, places, powers, strict=True):
+            for i, (order, most, count) in enumerate(zip(own, self.nodes, self.asked, strict=True)):
+                if count > 1:
+                    quarter, *exponents = quarters(order)
+                    row[i], pair[i] = (quarter, count - most + order - QUARTERS * quarter), exponents
+        return [places.astype(np.int64), powers]
+
+    def behind(self, columns: Sequence[NDArray[Any]], at: slice) -> list[int]:
+        return [self.looks, *map(address, columns)]
+
+
+Left = Proved | Judged
+
+
 class LoweredCells(Struct, frozen=True):
     """The rule for cells of one integrand with any number of nodes, for parameters with these parts.
 
-    kind: what is written: with coefficients that tell what it leaves out, the means alone, or totals of members. lanes:
-    how many cells it does at a time.
+    kind: what is written: means alone, or what adds to the totals of members what is good enough, as is known
+    beforehand or told by coefficients. lanes: how many cells it does at a time.
     """
 
     plan: StraightIntegral
@@ -79,53 +131,33 @@ class LoweredCells(Struct, frozen=True):
             machine.backend, lambda: self.kind(self.plan, self.face, machine, self.lanes).text(self.places)
         )
 
-    def run(
-        self, function: Loaded, env: Mapping[str, Value], members: Ints, between: Ints, axes: Sequence[Axis],
-        directions: int,
-    ) -> Raw:  # fmt: skip
-        """The sums over cells. members: (M,), whose they are; between: (M,), which rows they lie, as numbers."""
-        k1, count = 1 + directions, members.size
-        numbers, arrays = given(self.places, env)
-        sizes = [3 * k1 + self.kind.beside, *(axis.transform.shape[1] * k1 for axis in axes)]
-        out = np.empty((sum(sizes), max(count, self.lanes)))
-        told = [whole(column, out.shape[1]) for column in (members, between)]
-        frame = frame_of(out, axes, [*told, *arrays])
-        function.call(address(frame), address(numbers))
-        counts.native_points += count * math.prod(len(axis.nodes) for axis in axes)
-        found = out[:, :count]
-        number, most, off, clear = found[:k1], found[k1 : 2 * k1], found[2 * k1 : 3 * k1], found[3 * k1] > 0
-        corners, largest = found[3 * k1 + 1 : sizes[0]]
-        parts = np.split(found[sizes[0] :], np.cumsum(sizes[1:])[:-1])
-        coefficients = [part.reshape(-1, k1, count).transpose(1, 2, 0) for part in parts]
-        return Raw(number, coefficients, most, off, clear, corners, largest)
-
     def add(
         self, function: Loaded, env: Mapping[str, Value], members: Ints, between: Ints, runs: Sequence[Run],
-        wanted: Wanted, beyond: Array | None, total: Array,
+        wanted: Wanted, left: Left, total: Array, kept: bool = True,
     ) -> Bools:  # fmt: skip
-        """Add the sums over those cells that are good enough to those of their members; which these are (M,).
+        """Add the sums over those cells that are good enough to those of their members, if they are to be `kept`; which
+        these are, and for which of them each look would do by itself, (1 + looks, M).
 
-        runs: one after the other, all cells. beyond: what is left out of each, (1 + k, M). total: (4, 1 + k, B),
-        numbers, what rounding puts them off, what is added up, and what is left out.
+        runs: one after the other, all cells. total: (4, 1 + k, B), numbers, what rounding puts them off, what is added
+        up, and what is left out.
         """
         numbers, arrays = given(self.places, env)
         constants = np.concatenate(((wanted.part, wanted.added, math.nan), numbers))
         least = max(max(run.stop, run.first + self.lanes) for run in runs)
-        good, proved = np.empty((1, least)), beyond is not None
+        good, rows = np.empty((1 + left.looks, least)), (PARTS + left.told) * total.shape[1]
         cells = [whole(column, least) for column in (members, between)]
-        left = [whole(row, least) for row in beyond] if beyond is not None else []
-        told = address(total), total.strides[1] // total.itemsize, int(wanted.whole), int(proved)
+        beyond = left.columns(least)
+        told = address(total), total.strides[1] // total.itemsize, int(wanted.whole)
         for run in runs:  # what a short one says of cells behind it, these say themselves later
             constants[BESIDE] = run.beside
             for start, stop in parts(max(run.stop - run.first, self.lanes), AT_ONCE):
                 at = slice(run.first + start, run.first + stop)
                 frame = frame_of(good[:, at], run.axes, [*(column[at] for column in cells), *arrays])
-                where = [address(row[at]) for row in left] or [0] * total.shape[1]
-                count = min(at.stop, run.stop) - at.start
-                frame = np.array([*frame, *told, count, *where], dtype=np.int64)
+                there = min(at.stop, run.stop) - at.start if kept else 0
+                frame = np.array([*frame, *told, there, rows, *left.behind(beyond, at)], dtype=np.int64)
                 function.call(address(frame), address(constants))
             counts.native_points += (run.stop - run.first) * math.prod(len(axis.nodes) for axis in run.axes)
-        return np.asarray(good[0, : members.size] > 0)
+        return np.asarray(good[:, : members.size] > 0)
 
 
 def lowered_cells(

@@ -168,6 +168,11 @@ class FormulaText:
     def times(self, x: str | None, y: str | None) -> str | None:
         return None if x is None or y is None else self.at.apply("mul", x, y)
 
+    def greater(self, x: str, y: str) -> str:
+        """The greater one; of a number and what is none, the number."""
+        at = self.at
+        return at.apply("select", at.apply("gt", x, y), x, at.apply("select", at.apply("eq", y, y), y, x))
+
     def total(self, *terms: str | None) -> str | None:
         result = None
         for term in terms:

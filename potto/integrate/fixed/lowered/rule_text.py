@@ -1,4 +1,4 @@
-"""The text of a product rule (`cells`), as LLVM reads it.
+"""What the texts of product rules (`cells`) are made of, as LLVM reads them.
 
 Owns `RuleText`. In loops over the nodes of the variables, from the outermost to the innermost, bounds, cuts, nodes and
 the integrand are worked out, and Legendre coefficients added up on the way back. A formula is worked out in the
@@ -33,16 +33,15 @@ CELL = 2  # columns that tell of a cell: whose it is, and between which rows it 
 
 
 class RuleText(RowText):
-    """Writes the function. Lists of 1 + k names have a value first, then its tangents.
+    """Writes parts of functions. Lists of 1 + k names have a value first, then its tangents.
 
     Behind the tables the frame tells where the columns are: whose cells they are, between which rows they lie (a whole
     number each, as of `rows_between`), and those of parameters, a number for every member.
 
-    Rows of results: the integrals with their tangents, the most that is added up for each and what rounding puts it
-    off, then so many `beside`: whether a cell is clear, the largest value at corners, and at nodes; then coefficients.
+    added: memory for the sizes of coefficients along each variable.
     """
 
-    beside = 3
+    added: list[str]
 
     def __init__(self, plan: StraightIntegral, face: Term, machine: Evaluator, lanes: int = LANES) -> None:
         super().__init__(plan, machine, lanes)
@@ -51,20 +50,8 @@ class RuleText(RowText):
         self.channels = self.k1
 
     def text(self, places: Sequence[ParameterPlace]) -> str:
-        at, k1 = self.at, self.k1
-        self.begin()
-        self.added = [at.room(at.whole("mul", table[1], k1)) for table in self.tables]
-        corners, largest = at.room(1), at.room(1)
-        here = self.cells(places)
-        at.store(self.zero, corners)
-        at.store(self.zero, largest)
-        for i, table in enumerate(self.tables):
-            self.fill(self.added[i], table[1], k1)
-        number = self.every(0, here, [self.one, *[None] * (k1 - 1)], largest)
-        sizes, off = self.rounded(here)
-        self.ends(0, {name: still(symbol) for name, symbol in here.items()}, corners)
-        self.told([*number, *sizes, *off, at.load(self.clear), at.load(corners), at.load(largest)], k1)
-        return self.end()
+        """The function, for parameters with these parts."""
+        raise NotImplementedError
 
     def cells(self, places: Sequence[ParameterPlace]) -> Env:
         """The parameters of the cells of a block, which are clear so far; between which rows they lie is noted."""
@@ -73,6 +60,7 @@ class RuleText(RowText):
         self.members, between = (
             at.wholes(at.at(at.address("%frame", start + column, "ptr"), self.first, "i64")) for column in range(CELL)
         )
+        self.tail = start + CELL + sum(place.kind == "array" for place in places)
         here, _ = self.parameters(places, start + CELL, 0, self.members)
         rows = [at.digit(between, row_shift(place, count), ROW_BITS) for place in range(2 * count)]
         self.rows = list(zip(rows[::2], rows[1::2], strict=True))
@@ -116,26 +104,13 @@ class RuleText(RowText):
         self.kept = [at.room(at.whole("mul", table[0], self.channels)) for table in self.tables]
         self.block()
 
-    def told(self, values: Sequence[str | None], each: int) -> None:
-        """Put rows of results: these, then of each variable so many for each of its coefficients."""
-        at, row = self.at, 0
-        for value in values:
-            at.store(value or self.zero, self.place(row))
-            row += 1
-        behind = at.whole("add", row, 0)
-        for added, table in zip(self.added, self.tables, strict=True):
-            size = at.whole("mul", table[1], each)
-            own = at.begin(size)
-            at.store(at.load(at.at(added, own)), self.place(at.whole("add", behind, own)))
-            at.end()
-            behind = at.whole("add", behind, size)
-
     def place(self, row: int | str) -> str:
         """Where the results of a block are in a row."""
         at = self.at
         return at.at(self.out, at.whole("add", at.whole("mul", row, self.length), self.first), "double")
 
     def end(self) -> str:
+        """The text, where the loop over cells ends."""
         self.at.end()
         return module(self.at, NAME, "ptr %frame, ptr %constants")
 

@@ -1,57 +1,30 @@
-"""The text of a product rule that adds what it finds to the sums of members, as LLVM reads it.
+"""The text of a product rule of which it is known what it leaves out, as LLVM reads it.
 
 Owns `TotalText`. Where it is known beforehand that nodes are enough, or by how much they are not, nothing is left to be
-decided beside a cell: its integral, and how far off it is, go to the member whose it is on the spot, if it is good
-enough. Several cells of a member may be done at a time, so that they are added one after the other.
+decided beside a cell but whether that is little enough.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
+from potto.integrate.fixed.lowered.adding_text import BEYOND, PARTS, ROWS, AddingText
 from potto.integrate.fixed.lowered.formula_text import ParameterPlace
 from potto.integrate.fixed.lowered.mean_text import MeanText
-from potto.integrate.fixed.lowered.rule_text import CELL
-from potto.integrate.fixed.moving_sums import SUMMED
-
-# Of the constants, the first ones: what is good enough, as parts of the number and of what is added up; and how many
-# times more rounding may be than at the nodes where it is followed.
-PART, ADDED, BESIDE = range(3)
-# At how many nodes rounding is followed at each; at a few of them, where there are more.
-TRACKED = 1 << 14
-# How many times more rounding may be elsewhere than at the nodes where it is followed.
-ELSEWHERE = 2.0
-# Behind the columns the frame tells where the sums are, and how long their rows; whether what is known of the whole
-# counts; whether it is told what is left out; how many cells there are; then where columns of what is left out are.
-TOTAL, LENGTH, WHOLE, PROVED, THERE, BEYOND = range(6)
-PARTS = 3  # of a sum, before what is left out of it: a number, its rounding, and what is added up
 
 
-class TotalText(MeanText):
-    """Writes the function. Its one row of results says which cells were good enough."""
-
-    reserved = 3
+class TotalText(AddingText, MeanText):
+    """Writes the function. Where as many rows of sums are asked for as what is left out has, it is told that."""
 
     def text(self, places: Sequence[ParameterPlace]) -> str:
-        at = self.at
         self.begin()
         here = self.cells(places)
-        self.tail = self.columns + CELL + sum(place.kind == "array" for place in places)
-        number = [x or self.zero for x in self.mean(0, here)]
-        sizes, off = self.rounded(here)
-        beside, share = at.constant("%constants", BESIDE), at.number(ELSEWHERE * SUMMED)
-        gross = [at.apply("max", x or self.zero, at.apply("abs", v)) for x, v in zip(sizes, number, strict=True)]
-        rounding = [at.apply("add", at.apply("mul", beside, x or self.zero), at.apply("mul", share, most))
-                    for x, most in zip(off, gross, strict=True)]  # fmt: skip
+        number, rounding, gross = self.off(self.mean(0, here), here)
         beyond = self.beyond()
         good = self.good(self.known(number), gross, beyond)
-        at.store(at.apply("select", good, self.one, self.zero), self.place(0))
+        self.flag(0, good)
         self.add([*number, *rounding, *gross, *beyond], good)
         return self.end()
-
-    def behind(self, slot: int, kind: str = "i64") -> str:
-        """What the frame tells behind the columns."""
-        return self.at.address("%frame", self.tail + slot, kind)
 
     def beyond(self) -> list[str]:
         """What is left out of the cells of a block, where that is told."""
@@ -59,56 +32,9 @@ class TotalText(MeanText):
         rooms = [at.room(1) for _ in range(self.k1)]
         for room in rooms:
             at.store(self.zero, room)
-        at.begin("1", self.holds(PROVED))
+        rows = self.behind(ROWS)
+        at.begin("1", at.once(f"icmp ugt i64 {rows}, {PARTS * self.k1}", rows))
         for c, room in enumerate(rooms):
             at.store(at.load(at.at(self.behind(BEYOND + c, "ptr"), self.first, "double")), room)
         at.end()
         return list(map(at.load, rooms))
-
-    def known(self, number: Sequence[str]) -> list[str]:
-        """How large numbers are, or what they go into is known to be."""
-        at, rooms = self.at, [self.at.room(1) for _ in number]
-        for x, room in zip(number, rooms, strict=True):
-            at.store(at.apply("abs", x), room)
-        at.begin("1", self.holds(WHOLE))
-        for c, room in enumerate(rooms):
-            row = at.at(self.behind(TOTAL, "ptr"), at.whole("mul", c, self.behind(LENGTH)), "double")
-            self.raise_to(room, at.apply("abs", at.gather(row, self.members)))
-        at.end()
-        return list(map(at.load, rooms))
-
-    def good(self, sizes: Sequence[str], gross: Sequence[str], beyond: Sequence[str]) -> str:
-        """A mask of the cells of which no more is left out than may be."""
-        at = self.at
-        part, added = (at.constant("%constants", slot) for slot in (PART, ADDED))
-        good = at.apply("gt", at.load(self.clear), self.zero)
-        for size, most, left in zip(sizes, gross, beyond, strict=True):
-            enough = at.apply("max", at.apply("mul", part, size), at.apply("mul", added, most))
-            good = at.apply("and", good, at.apply("le", left, enough))
-        return good
-
-    def holds(self, slot: int) -> str:
-        return self.at.once(f"icmp ne i64 {self.behind(slot)}, 0", self.behind(slot))
-
-    def add(self, values: Sequence[str], good: str) -> None:
-        """Add these rows to those of the members, for the cells of a mask that are not done twice."""
-        at, lanes = self.at, self.at.lanes
-        numbers = ", ".join(f"double {float(lane)}" for lane in range(lanes))
-        cells = at.apply("add", self.spread(self.first), f"<{numbers}>")
-        fresh = at.apply("and", at.apply("ge", cells, self.spread(self.number)),
-                         at.apply("lt", cells, self.spread(self.behind(THERE))))  # fmt: skip
-        mask, room = at.apply("and", good, fresh), at.room(len(values))
-        for slot, value in enumerate(values):
-            at.store(at.apply("select", mask, value, self.zero), at.at(room, slot))
-        owners = [at.once(f"extractelement {at.whole_numbers} {self.members}, i32 {lane}", self.members)
-                  for lane in range(lanes)]  # fmt: skip
-        proved = at.once(f"select i1 {self.holds(PROVED)}, i64 {len(values)}, i64 {PARTS * self.k1}",
-                         self.holds(PROVED))  # fmt: skip
-        row = at.begin(proved)
-        start, found = at.whole("mul", row, self.behind(LENGTH)), at.load(at.at(room, row))
-        for lane, owner in enumerate(owners):
-            place = at.at(self.behind(TOTAL, "ptr"), at.whole("add", start, owner), "double")
-            before = at.let(f"load double, ptr {place}")
-            own = at.let(f"extractelement {at.doubles} {found}, i32 {lane}")
-            at.line(f"store double {at.let(f'fadd double {before}, {own}')}, ptr {place}")
-        at.end()

@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 
 from potto.core.terms import Term
 from potto.integrate.fixed.axes import MEAN, Axis, axis
+from potto.integrate.fixed.lowered.adding_text import ELSEWHERE, TRACKED
 from potto.integrate.fixed.lowered.cells import LoweredCells, frame_of, lowered_cells
 from potto.integrate.fixed.lowered.mean_text import MeanText
-from potto.integrate.fixed.lowered.total_text import ELSEWHERE, TRACKED
 from potto.integrate.fixed.moving_sums import SUMMED, MovingTotals, summed
 from potto.integrate.fixed.straight import StraightIntegral, between_rows
 from potto.integrate.pieces import Evaluator
