@@ -105,8 +105,8 @@ class Publisher:
             self.push(key)
 
     def push(self, key: str) -> None:
-        """Check a file, and send the client whatever is new. After an edit it is always sent: the client has moved its
-        marks by guessing."""
+        """Check a file, and send the client whatever is new. After an edit it is always sent: the client has guessed
+        where its marks moved."""
         report = self.report(key)
         document = self._analysis.document(key)
         sent = self._sent.get(key)
@@ -156,7 +156,7 @@ class Publisher:
         return {"uri": self._analysis.uri(key), "version": version, **self.answer(key, previous)}
 
     def gone(self, known: Iterable[str]) -> list[dict[str, Any]]:
-        """Empty reports for files that a client knows, or may still show, and that are not programs any longer.
+        """Empty reports for files that a client knows, or may still show, and that are no longer programs.
 
         A client that asks for a file one last time before it closes it keeps showing that answer until it hears of the
         file again, without telling us. So files that were deleted or renamed while open are listed every time.

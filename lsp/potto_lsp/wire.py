@@ -164,7 +164,7 @@ class Outbox:
                 self._queue.put(left)
 
     def close(self, seconds: float = 2.0) -> None:
-        """Write what is left, for at most so many seconds."""
+        """Write what is left, but give up after `seconds`."""
         self._queue.put(None)
         self._thread.join(seconds)
 

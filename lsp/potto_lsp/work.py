@@ -155,7 +155,7 @@ class Worker:
         return Job("idle", lambda job: step())
 
     def _receive(self, wait: bool, seconds: float | None = None) -> bool:
-        """Sort what has come, or what comes within so many seconds. Whether there was anything."""
+        """Sort the jobs that have come, or that come within `seconds`. Whether there were any."""
         found = False
         try:
             while True:
@@ -198,8 +198,8 @@ class Worker:
             time.sleep(NOD)  # whoever is answered may be on this processor, and would wait for it as well
 
     def _look_around(self) -> None:
-        """Leave the processor to the thread that reads, if a message has arrived and the running job gives way. Both
-        may have the same one, where a thread that wakes waits for the next tick as long as the other has work."""
+        """Leave the processor to the reading thread if a message has arrived and the running job gives way. Where both
+        share a processor, a thread that wakes would otherwise wait for the next tick while the other has work."""
         self._looked = (self._looked + 1) % LOOK
         job = self._running
         if self._looked or job is None or job.kind not in YIELDING or not self._arrived():
@@ -209,7 +209,7 @@ class Worker:
             time.sleep(NOD)
 
     def _give_way(self, job: Job) -> None:
-        """Come back to a job after everything more urgent; to idle work only if no edit has started that over."""
+        """Return to a job after everything more urgent; to idle work only if no edit has restarted it."""
         if job.kind == "idle":
             self._steps = chain([lambda: job.run(job)], self._steps or ())
         elif not job.claimed:

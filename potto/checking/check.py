@@ -1,4 +1,4 @@
-"""All that there is to say about a file: what each floor of the front end has found, with absolute spans.
+"""Everything there is to say about a file: what each floor of the front end has found, with absolute spans.
 
 Owns the gathering and the order. The floors that check (syntax, modules, types, elaboration, diffeomorphisms) know
 nothing of each other's messages; here they meet. No numbers, no files, no rendering.

@@ -46,8 +46,8 @@ class Keeper:
         self._sender, self._key, self._parts = Sender(db), _key(roots), Parts()
 
     def add(self, part: Part) -> None:
-        """Add what is known of a part. Raises what its check raises, TypeError or RecursionError where an answer is no
-        data, and Cancelled."""
+        """Add what is known of a part. Raises what its check raises, TypeError or RecursionError where an answer
+        cannot be written as data, and Cancelled."""
         if not self._is_whole():
             return
         self._whole = False
@@ -58,8 +58,7 @@ class Keeper:
         self._whole = True
 
     def finish(self) -> bool:
-        """Write what was added; whether it is whole. Where it cannot be written the next session takes longer, nothing
-        else."""
+        """Write what was added; whether it is complete. If it cannot be written, the next session only takes longer."""
         if self._is_whole():
             store.put(KIND, self._key, msgpack.encode(self._parts))
         return self._whole

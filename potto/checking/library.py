@@ -98,7 +98,7 @@ class Library:
         return bool(self.files.refresh())
 
     def stands(self, key: str) -> bool:
-        """Whether all that is known rests on the text of one pseudo file, and on a project file that is as it was."""
+        """Whether everything known rests on the text of one pseudo file, and on a project file that has not changed."""
         inputs = set(self.db.input_keys())
         return inputs <= {("roots",), ("overlay", key)} and Projects().of(key) == self.project(key)
 
@@ -112,7 +112,7 @@ class Library:
         return found if project is None or not project.lints else tuple(levelled(found, project.lints))
 
     def all_diagnostics(self, files: Sequence[str]) -> Iterator[tuple[Located, ...]]:
-        """The same of many files, one after the other, with the help of other processes if they are worth it."""
+        """The same for many files, one after the other, with the help of other processes if that pays."""
         from potto.crew import Crew, helpers_for
 
         with Crew(self.db, self.files.roots, files, helpers_for(files)) as crew:

@@ -31,7 +31,7 @@ _MARK = b"\xef\xbb\xbf"  # of the order of bytes, which is not part of a text
 
 
 def _given_again(key: bytes, now: Callable[[str], bytes | None]) -> Any:
-    """The answer kept under a key, if all that was read for it has the digest that it had; None if there is none."""
+    """The answer kept under a key, if everything that was read for it still has the same digest; else None."""
     found = recall(KIND, key)
     if found is None:
         return None
@@ -87,7 +87,7 @@ def _texts(db: Database) -> Mapping[str, bytes] | None:
 
 
 def _on_disk(path: str) -> bytes | None:
-    """The digest of a file as it is now; None of what is there and is not a file that can be read."""
+    """The digest of a file as it is now; None if something is there that cannot be read as a file."""
     try:
         if not stat.S_ISREG(os.stat(path).st_mode):  # reading a pipe might never end
             return None

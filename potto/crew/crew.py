@@ -25,8 +25,8 @@ AHEAD = 4  # parts that a helper is given before it has told about the first
 
 
 def helpers_for(files: Iterable[str], opened: int = 0, processors: int | None = None) -> int:
-    """How many helpers are worth their start for so many files, and bytes of open ones: one processor is left to who
-    asks for them."""
+    """How many helpers are worth starting for these files and `opened` bytes of open ones: one processor is left to
+    whoever asks."""
     sizes = opened
     for file in files:
         try:
@@ -45,8 +45,8 @@ def usable_processors() -> int:
 
 
 class Crew:
-    """Helpers that check files, and pieces of them, from the last one on. All but what the listeners do is for one
-    thread at a time."""
+    """Helpers that check files, and pieces of them, beginning with the last. One thread at a time may use it, beside
+    the listeners."""
 
     def __init__(
         self,
@@ -57,7 +57,7 @@ class Crew:
         texts: Mapping[str, str] | None = None,
         pieces: Iterable[tuple[str, str]] = (),
     ) -> None:
-        """pieces: of files, to be checked before all others, from the last one on."""
+        """pieces: of files, to be checked before everything else, beginning with the last."""
         self._db, self._roots = db, tuple(roots)
         whole: list[Part] = [(file, None) for file in files]
         self._left = dict.fromkeys([*whole, *pieces])  # what nobody has begun
@@ -137,7 +137,7 @@ class Crew:
         Thread(target=self._listen, args=(helper,), name="potto-crew", daemon=True).start()
 
     def _listen(self, helper: _Helper) -> None:
-        """Give a helper parts and hear what it says, on a thread of its own."""
+        """Give a helper parts and take its answers, on a thread of its own."""
         self._give(helper, AHEAD)
         helper.expected -= 1
         try:
@@ -167,7 +167,7 @@ class _Helper:
         self.expected = 1  # answers; one more until it has been given parts
 
     def put(self, parts: tuple[Part, ...], roots: tuple[str, ...], texts: Mapping[str, str]) -> None:
-        """Give it parts, and the texts that are not as it has them. One that is dead does not hear it."""
+        """Give it parts, and the texts of which it has another version. A dead helper does not notice."""
         changed = [(key, text) for key, text in texts.items() if self._texts.get(key) != text]
         closed = [(key, None) for key in self._texts if key not in texts]
         self._texts = texts

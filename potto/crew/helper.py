@@ -1,4 +1,4 @@
-"""What a helper process does: it checks files that it is told, in a database of its own, until its input ends."""
+"""What a helper process does: it checks the files that it is given, in a database of its own, until its input ends."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from potto.query.parcels import Asked, Sender
 
 
 def serve(reader: BinaryIO, writer: BinaryIO) -> None:
-    """Check the parts of each task and tell about one after the other."""
+    """Check the parts of each task and answer one after the other."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # a terminal sends it to everybody; the input ends all the same
     gc.disable()  # it lives for seconds, and nearly all that it makes stays
     tasks: SimpleQueue[CheckTask] = SimpleQueue()
@@ -34,7 +34,7 @@ def serve(reader: BinaryIO, writer: BinaryIO) -> None:
 
 
 def _read(reader: BinaryIO, tasks: SimpleQueue[CheckTask]) -> None:
-    """Read tasks as they come, so that whoever gives them never waits. At the end there is nobody to tell anything."""
+    """Read tasks as they come, so that whoever gives them never waits. At the end nobody is left to answer."""
     while (task := unpacked(reader)) is not None:
         tasks.put(task)
     os._exit(0)

@@ -1,4 +1,4 @@
-"""Messages between a crew and its helpers: pickled objects with their length in front, over pipes that are theirs."""
+"""Messages between a crew and its helpers: pickled objects, each behind its length, over pipes of their own."""
 
 from __future__ import annotations
 

@@ -158,7 +158,7 @@ class Memo:
     def kept(self) -> Memo | None:
         """This memo as it stands, for `before`. Of a member of a cycle nothing is kept: its answer rests on more than
         what it has read. Nobody reads what is kept, so it needs no `source`, and is freed with its last reference: as
-        its own source it would wait for the garbage collector, one of these for each query that an edit runs."""
+        its own source it would be a cycle for the garbage collector, one for each query that an edit runs."""
         if self.value is GONE or self.verified_at < 0 or self.ring or self.durability:
             return None
         memo = Memo(self.query, self.args)

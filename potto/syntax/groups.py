@@ -1,7 +1,7 @@
 """Parentheses, which may turn out to be an expression, a tuple, arguments, parameters or variables.
 
-Owns `Context`, `Parenthesized` and what makes of a group what its place asks for. What has no meaning there is reported
-and mended, so that a tree remains.
+Owns `Context`, `Parenthesized` and the functions that turn a group into what its place asks for. What has no meaning
+there is reported and mended, so that there is always a tree.
 """
 
 from __future__ import annotations
@@ -84,7 +84,7 @@ class Suffix(NamedTuple):
 
 
 def suffixed(value: Expr, suffixes: tuple[Suffix, ...]) -> Expr:
-    """A value with what stands behind it; brackets with a condition in them are an argument."""
+    """A value with its suffixes; brackets with a condition in them are an argument."""
     for end, items, name in suffixes:
         span = Span(value.span.start, end)
         if name is not None:
@@ -106,7 +106,7 @@ def is_condition(expr: Expr) -> bool:
 
 
 def as_expr(context: Context, value: Any) -> Expr:
-    """Parentheses that stand for a value: `(e)` or a tuple; anything but parentheses as it is."""
+    """Parentheses as a value: `(e)` or a tuple. Anything else is returned unchanged."""
     kind = type(value)
     if kind is Suffixed:
         return suffixed(as_expr(context, value.group), value.suffixes)
@@ -126,7 +126,7 @@ def as_expr(context: Context, value: Any) -> Expr:
 
 
 def plain(context: Context, written: ListedItem, before: Expr | None = None) -> Expr:
-    """A thing between commas where only an expression has a meaning. before: the one before it, if that matters."""
+    """An item between commas where only an expression makes sense. before: the item before it, if that matters."""
     if written.separator == ";":
         _semicolon(context, written)
     if written.name is None:

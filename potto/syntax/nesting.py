@@ -188,7 +188,7 @@ class Nesting:
     def _is_stray(self, kind: str, end: int) -> bool:
         """Whether a closing bracket is of a kind that is not open, and what is open is closed further on without it."""
         if len(self.diagnostics) >= MOST_MESSAGES or any(_CLOSER[bracket.kind] == kind for bracket in self.brackets):
-            return False  # beyond so many messages it is not looked far ahead for one more
+            return False  # after that many messages, looking far ahead for one more is not worth it
         depth, wanted = 0, _CHARACTER[_CLOSER[self.brackets[-1].kind]]
         for found in _BRACKET.finditer(self.text, end):
             if found[0] in "([":

@@ -122,7 +122,7 @@ def _condition(inference: Inference, node: nodes.If) -> None:
         kind = "diffeo"
     elif not isinstance(found, Truth | Unknown):
         inference.report(_no_condition(found, node.condition))
-        kind = "bracket"  # that it varies is no second mistake
+        kind = "bracket"  # that it varies is not a second mistake
     inference.conditions[id(node)] = kind
 
 

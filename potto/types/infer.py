@@ -145,7 +145,7 @@ _APPLIED = {
 
 @cache
 def _of_numbers(count: int) -> Function:
-    """A number for so many numbers."""
+    """A number, made of as many numbers as are given."""
     return Function((Parameter(None, REAL),) * count, REAL)
 
 

@@ -134,7 +134,7 @@ _NAMED = {"HAZE": HAZE, "VARYING": VARYING}
 
 
 def _symbol(kind: Literal["named", "source", "port", "sink"], *made_of: Any) -> Any:
-    """The one symbol of an interface that there is in this process, from what is told of it to another one."""
+    """The only copy of an interface's symbol in this process, found by what `_told` says of it."""
     find: dict[str, Callable[..., Any]] = {"named": _NAMED.__getitem__, "source": _source, "port": _port, "sink": _sink}
     return find[kind](*made_of)
 

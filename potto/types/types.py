@@ -27,7 +27,7 @@ class Real(Struct, frozen=True):
 
 
 class Dist(Struct, frozen=True):
-    """A distribution over variables (or parameters): only an integral over them makes a number of it."""
+    """A distribution over variables (or parameters): only an integral over them turns it into a number."""
 
     variables: tuple[str, ...] = ()
 

@@ -32,7 +32,7 @@ POINTS = {1: 1000, 2: 100, 3: 20}  # in each variable, by the number of variable
 
 
 def points_of(dimensions: int) -> int:
-    """The points in each variable for integrals over so many."""
+    """How many points each variable gets, by the number of variables."""
     return POINTS.get(dimensions, 8)
 
 
@@ -46,7 +46,7 @@ def dimensions(term: Term) -> int:
 
 
 def discretized(term: Term, points: int) -> Term:
-    """The term with each integral as a sum over the midpoints of so many equal parts."""
+    """The term with each integral as a sum over the midpoints of equal parts."""
     memo: dict[Term, Term] = {}
     for node in postorder(term):
         new = rebuild(node, tuple(memo[child] for child in children(node)))

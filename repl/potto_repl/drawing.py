@@ -26,7 +26,7 @@ _ANSI = (34, 31, 32, 35, 33)
 
 
 def room_for_curves(columns: int) -> int:
-    """How wide curves are drawn on a screen of so many columns: beside them stand the numbers of the axis."""
+    """How wide curves are drawn on a screen this wide: beside them stand the numbers of the axis."""
     return max(6, min(columns - 14, 72))
 
 
@@ -103,7 +103,7 @@ def half_blocks(image: Image, *, unicode: bool = True, color: bool = True) -> st
 
 
 def shrunk(image: Image, columns: int) -> Image:
-    """The image in at most so many columns. If there are too many pixels, the ones in the middle of the others are
+    """The image, no wider than `columns`. If there are too many pixels, the ones in the middle of the others are
     taken."""
     width, height = image.size
     if width <= columns:
@@ -146,7 +146,7 @@ def protocol(environment: Mapping[str, str] = os.environ) -> Protocol:
 
 
 def inline(image: Image, how: Protocol, columns: int) -> str:
-    """The escape codes that show an image across so many columns."""
+    """The escape codes that show an image across the given number of columns."""
     if how == "kitty":
         data = base64.b64encode(image.png()).decode()
         pieces = [data[i : i + 4096] for i in range(0, len(data), 4096)]

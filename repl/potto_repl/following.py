@@ -167,7 +167,7 @@ def _check_all(session: Conversation, before: _State, parts: list[Part]) -> int:
         parts += [diagnostic(d, session.source) for d in said if d in wrong or _remark(d) not in before.seen]
         text = session.world.source(file)
         if wrong and file in before.files and (text is None or before.files[file] != text.text):
-            parts.append(note(f"{display_name(file)}: the definitions of before are kept"))
+            parts.append(note(f"{display_name(file)}: the earlier definitions are kept"))
             session.broken[file] = _stamp(file)
     for file in session.broken:
         session.world.files.set_text(file, before.files[file])

@@ -1,4 +1,4 @@
-"""Recorded sessions: entered again, and their answers compared with those of before.
+"""Recorded sessions: entered again, and their answers compared with the recorded ones.
 
 Owns `replayed`. Numbers may differ by what their error bars and their
 last digits leave open; what was measured (times, evaluations) is not compared.

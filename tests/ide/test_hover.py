@@ -266,7 +266,7 @@ def test_plain_condition_that_varies_shows_what_it_would_be_in_brackets():
 
 def test_conditions_that_are_joined_are_not_called_plain():
     f = fixture("def f(t)\n    integral [0, 1] ([x < t] and [x > t/2] ? 1 : 0) d(x)\n")
-    assert "plain" not in f.hover("and") and "Both conditions." in f.hover("and")
+    assert "plain" not in f.hover("and") and "both conditions hold" in f.hover("and")
 
 
 def test_bracket_over_parameters_says_where_it_jumps():

@@ -136,7 +136,7 @@ def test_files_that_change_while_they_are_watched(talk):
     for change, says in changes:
         change()
         text = fine(talk("f(1)"))
-        assert re.search(says, text) and "definitions of before are kept" in text and "= 2 " in text
+        assert re.search(says, text) and "earlier definitions are kept" in text and "= 2 " in text
         assert fine(talk("f(2)")).startswith("_") and "= 4 " in talk("f(2)").text  # said once, not each time
     path.rmdir()
     path.write_text("def f(t) 50*t")

@@ -284,7 +284,7 @@ def test_loading_again_keeps_the_old_on_an_error(talk):
     assert "1 of 1 compiled" in talk(":load a.po").text
     talk.write("a.po", "def f(t) 2*")
     reply = talk(":load a.po")
-    assert reply.failed and "the definitions of before are kept" in reply.text
+    assert reply.failed and "the earlier definitions are kept" in reply.text
     assert talk.data("f(3)")["value"] == 6
 
 
@@ -293,7 +293,7 @@ def test_a_broken_file_keeps_its_old_definitions_and_says_so(talk):
     talk.all(":load a.po")
     talk.write("a.po", "def f(t) 2*")
     reply = talk(":reload")
-    assert reply.failed and "a.po: the definitions of before are kept" in reply.text and "def f(t) 2*" in reply.text
+    assert reply.failed and "a.po: the earlier definitions are kept" in reply.text and "def f(t) 2*" in reply.text
     assert talk.data("f(3)")["value"] == 6
     talk.write("a.po", "def f(t) 4*t")
     assert not talk(":reload").failed

@@ -40,11 +40,11 @@ from potto.source import Span
 from potto.types import TupleOf, format_type, groups_of
 
 MOST_IMPORTS = 100  # proposals from other modules in one list
-MOST_NAMES = 500  # of the file and of its imports: nobody reads more, and with each further letter there are fewer
+MOST_NAMES = 500  # of the file and of its imports: nobody reads more, and each further letter leaves fewer
 
 # Groups of proposals in the order of their likelihood.
 _ARGUMENT, _LOCAL, _OWN, _IMPORTED, _BUILTIN, _WORD, _OTHER = "0123456"
-_CLAUSE, _TOP = "00", "0"  # in front of all: what closes an open `if`, what begins a line at the top
+_CLAUSE, _TOP = "00", "0"  # before all others: what closes an open `if`, what begins a line at the top
 _OPERAND = re.compile(r"(?<![^\W\d])(?!(?:if|then|else|in|and|or|not|let|integral|sum)\s*$)(?:\w+|[)\]])\s+$")
 _OPENERS = {
     "then": r"\bif\b", "else": r"\bthen\b", "in": r"\b(?:let|for|sum)\b", "d": r"\bintegral\b|∫",
@@ -57,8 +57,8 @@ def completions(db: Database, file: str, offset: int, trigger: str = "") -> Comp
 
 
 def completions_after(db: Database, file: str, before: str) -> Completions:
-    """What can stand behind a text that belongs to no file, as at a prompt: the names are those of `file` and of the
-    entries in front of it. Spans are relative to the text."""
+    """What can follow a text that belongs to no file, as at a prompt: the names are those of `file` and of the entries
+    before it. Spans are relative to the text."""
     return _at(db, site_after(file, before), "")
 
 
@@ -106,7 +106,7 @@ def _everything(db: Database, site: Site, place: CompletionPlace) -> Completions
 
 
 def _likeliest(names: list[Completion], word: str) -> tuple[list[Completion], bool]:
-    """So many names as a list may have, first those that begin as the word does; whether some are left out."""
+    """As many names as a list may have, those that begin like the word first; and whether some are left out."""
     begun = word.casefold()
     if len(names) > MOST_NAMES:
         names.sort(key=lambda item: not item.label.casefold().startswith(begun))
@@ -257,7 +257,7 @@ def _keyword(keyword: Keyword, place: CompletionPlace, group: str) -> Completion
 
 
 def _fits(word: str, before: str, diffeo: bool) -> bool:
-    """Whether a word that continues something can stand here: what it continues is open in front of it."""
+    """Whether a word that continues something can stand here: whether what it continues is still open."""
     opener = _OPENERS.get(word)
     if opener is not None:
         closer = r"\bd\s*\(" if word == "d" else rf"\b{word}\b"

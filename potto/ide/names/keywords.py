@@ -45,8 +45,8 @@ _ALL = (
             "sum ${1:i} in ${2:1}..${3:n} (${0:i})", "expression"),
     Keyword("product", "A product over whole numbers or the elements of an array; `min` and `max` are written alike.",
             "product i in 1..n (i)", "product ${1:i} in ${2:1}..${3:n} (${0:i})", "expression"),
-    Keyword("fold", "A state that is stepped through whole numbers or the elements of an array: each is made of the "
-            "one before. It is differentiated as it runs.", "fold s = 0 for i in 1..n (s/2 + i)",
+    Keyword("fold", "A state that is updated for each whole number in a range, or for each element of an array. It "
+            "is differentiated as it runs.", "fold s = 0 for i in 1..n (s/2 + i)",
             "fold ${1:s} = ${2:0} for ${3:i} in ${4:1}..${5:n} (${0:s})", "expression"),
     Keyword("record", "Defines a record: a tuple whose parts have names. Its name makes one, by name or by place.",
             "record Camera(eye: (Real, Real), focal: Real)", "record ${1:Name}(${2:x}: ${0:Real})", "top"),
@@ -60,9 +60,9 @@ _ALL = (
             "let ${1:a} = ${2:1} in ${0:a}", "expression"),
     Keyword("in", "Ends the names of a `let`, or says what `for` and `sum` go through.", "let a = 1 in a", "in ",
             "clause"),
-    Keyword("and", "Both conditions.", "[a < x and x < b]", "and ", "clause"),
-    Keyword("or", "One condition or both.", "[x < a or b < x]", "or ", "clause"),
-    Keyword("not", "The opposite of a condition.", "[not x < a]", "not ", "expression"),
+    Keyword("and", "Holds where both conditions hold.", "[a < x and x < b]", "and ", "clause"),
+    Keyword("or", "Holds where at least one of the conditions holds.", "[x < a or b < x]", "or ", "clause"),
+    Keyword("not", "Holds where the condition does not.", "[not x < a]", "not ", "expression"),
     Keyword("as", "Another name for what is imported.", "from m import f as g", "as ", "clause"),
     Keyword("inverse", "The inverse of a diffeomorphism, from its author: from values of the coordinates back to the "
             "variables. It is verified.", "inverse (u, v) . (u + v, u - v)",
@@ -109,12 +109,12 @@ _SPECIALS = (
             "The cross product of two vectors of three numbers, tuples or arrays.",
             "d cross(u, v) = cross(du, v) + cross(u, dv)", "cross((1, 0, 0), (0, 1, 0))", ("u", "v")),
     Special("interp", "(xs: [n] Real, ys: [n] a, x: Real*) -> a",
-            "Piecewise linear through the values `ys` at the places `xs`, which rise; beyond them the value "
-            "at the end. The places are kinks that the integrator knows. The values may be tuples, arrays or records.",
+            "Linear between the values `ys` at the places `xs`, which must increase, and constant beyond them. "
+            "The places are kinks that the integrator knows. The values may be tuples, arrays or records.",
             "", "interp([0, 1, 3], [10, 20, 0], 2)", ("xs", "ys", "x")),
     Special("image", "(photo: [h, w] a, u: Real*, v: Real*) -> a",
-            "Bilinear between the centres of pixels: `u` from 0 to 1 along the rows, `v` from 0 to 1 down "
-            "the columns; beyond the outer centres the value there.", "",
+            "Bilinear between the centres of pixels, `u` from 0 to 1 along the rows and `v` from 0 to 1 "
+            "down the columns; constant beyond the outermost centres.", "",
             "image([[1, 2], [3, 5]], 0.5, 0.5)", ("photo", "u", "v")),
     Special("load", "the name of a file -> a", "What a file of data holds: the columns of a table (`.csv`) as the "
             "fields of a record, arrays (`.npy`, `.npz`), nested lists (`.json`), pictures (`.png`, `.jpg`).", "",
@@ -128,8 +128,8 @@ SPECIALS: dict[str, Special] = {special.name: special for special in _SPECIALS}
 TYPES: dict[str, str] = {
     "Real": "A number that varies with no variable of integration; `Real*` accepts one that does, and `Real[x]` varies "
     "with x.",
-    "Dist": "A distribution over variables of integration: what the derivative of something that jumps is. Only an "
-    "integral makes a number of it.",
+    "Dist": "A distribution over variables of integration, such as the derivative of something that jumps. Only an "
+    "integral turns it into a number.",
     "Diffeo": "What a diffeomorphism gives: coordinates that may stand as a condition.",
 }
 

@@ -1,8 +1,8 @@
 """Renaming: local names, parameters with the keyword arguments that fill them, definitions across modules, modules.
 
-Owns `prepare_rename` and `rename`. A definition is renamed with every import that passes it on under its own name; an
-alias ends the way. What a rename would capture or hide is refused: the names of each chunk are looked up again in the
-text as it would be, and must mean what they meant.
+Owns `prepare_rename` and `rename`. A definition is renamed with every import that passes it on under its own name, up
+to an alias. A rename that would capture or hide a name is refused: the names of each chunk are looked up again in the
+new text, and must mean what they meant.
 """
 
 from __future__ import annotations
@@ -171,7 +171,7 @@ def _root(db: Database, start: Bound) -> Bound:
 
 
 def _family(db: Database, root: Bound, file: str) -> tuple[Bound, ...]:
-    """The names in all files that stand for this one, passed on without another name."""
+    """The names in all files that stand for this one, passed on without an alias."""
     name = root[1]
     found = {root: None}
     candidates = [each for each in dict.fromkeys((file, *files(db))) if mentions(db, each, name)]
