@@ -64,3 +64,13 @@ def test_waves_too_short_for_differences(waves: float) -> None:
     with mp.workdps(40):
         exact = waves * (mp.sin(mp.mpf(waves) + 1) - mp.sin(mp.mpf(waves)))
         assert abs(answer.tangent - exact) <= answer.tangent_error <= 0.01 * abs(exact)
+
+
+def test_of_derivatives_with_the_digits_that_were_asked_for_there_are_none() -> None:
+    """Differences take 17 values. The derivative is the integral of exp(x - t/(3*x))/(3*x) from t/3 to 1."""
+    f, t = potto.compile("def f(t) integral ([0, 1], [0, 1]) [x*y < t/3]*exp(x - y) d(x, y)").f, 0.41
+    with potto.settings(rtol=1e-3):
+        value, answer = f(t), potto.grad(f)(t)
+    exact = mp.quad(lambda x: mp.exp(x - t / (3 * x)) / (3 * x), [t / 3, 1])
+    assert abs(answer.tangent - exact) <= answer.tangent_error <= 1e-3 * exact
+    assert answer.evals <= 2 * value.evals

@@ -120,9 +120,7 @@ class Iteration(Struct):
         keep, lost = self.kept(scene, seg, settled)
         if machine.costs is not None and number + 1 == len(self.plan.levels):
             machine.costs.stretches(seg.a.size, seg.a.size if keep is None else keep.size)
-        here, sides = seg, settled.sides
-        if keep is not None:
-            here, sides = seg.pick(keep), take(sides, keep)
+        here, sides = (seg, settled.sides) if keep is None else (seg.pick(keep), take(settled.sides, keep))
         moving = cuts.moving and machine.directions > 0
         if looks and number not in self.peaked and peaks_at_ends(self, number, env, here, sides, machine):
             self.peaked.add(number)

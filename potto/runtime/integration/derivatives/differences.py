@@ -20,7 +20,7 @@ from potto.kernels.cells import Array, Value
 from potto.runtime.evaluation.derivatives.beside import moved, moving
 from potto.runtime.integration.problem import Problem
 
-ROUGH = 1e-6  # from which relative error on another way is looked for
+ROUGH = 1e-6  # from which relative error on another way is looked for, unless no more was asked for
 FEW = 4  # members of a batch for which that is done
 REACH = 1 / 16  # the farthest point, as a part of the parameters
 SHRINKS = 0.6  # what a gap may be of itself when the step is halved
@@ -35,7 +35,11 @@ def by_differences(problem: Problem, order: Integral, sums: Sums) -> Sums:
     machine = problem.machine
     if problem.batch > FEW or machine.exhausted() or machine.side or problem.events.every(OneSidedDerivatives):
         return sums
-    rough = ~(sums.et <= ROUGH * np.abs(sums.t)) & np.isfinite(sums.v)[:, None] & ~(sums.et <= machine.atol)
+    rough = (
+        ~(sums.et <= max(ROUGH, machine.rtol) * np.abs(sums.t))
+        & np.isfinite(sums.v)[:, None]
+        & ~(sums.et <= machine.atol)
+    )
     if sums.gross is not None:
         rough &= ~(sums.et <= CANCELLED * np.where(np.isfinite(sums.gross[1]), sums.gross[1], 0.0))
     for member in map(int, np.nonzero(rough.any(axis=(0, 1)))[0]):
