@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from potto.core.terms import ONE, ZERO, Const, Term, div, if_, mul, neg, pow_, prim, sub
 from potto.primitives.registry import Primitive, Terms, register
+from potto.primitives.sizes import of_power, of_product, of_quotient, of_same_size, of_sum
 
 
 def _product_partials(*args: Term) -> Terms:
@@ -35,7 +36,10 @@ def _power_edges(base: Term, exponent: Term) -> Terms:
 
 
 def _power_exponents(base: Term, exponent: Term) -> Terms:
-    """Of such powers alone that have a layer where the base is 1."""
+    """The exponent of what varies as an exponential does; of others, such alone that have a layer where the base is
+    1."""
+    if not base.free:
+        return (mul(exponent, prim("log", prim("abs", base))),)
     if not isinstance(exponent, Const) or abs(exponent.value) <= PLAIN_POWER:
         return ()
     return (mul(exponent, prim("log", prim("abs", base))),)
@@ -50,6 +54,7 @@ add = register(
         scalar="potto.total",
         surface=False,
         doc="The sum of its arguments.",
+        magnitude=of_sum,
         partials=lambda *args: (ONE,) * len(args),
         domain=((-1e6, 1e6),),
         example="1 + 2 + 3",
@@ -65,6 +70,7 @@ mul_ = register(
         scalar="potto.product",
         surface=False,
         doc="The product of its arguments.",
+        magnitude=of_product,
         partials=_product_partials,
         domain=((-1e6, 1e6),),
         example="2*3*4",
@@ -83,6 +89,7 @@ neg_ = register(
         parity=-1,
         surface=False,
         doc="The number with the other sign.",
+        magnitude=of_same_size,
         partials=lambda x: (neg(ONE),),
         domain=((-1e6, 1e6),),
         inverse=lambda y: (neg(y),),
@@ -101,6 +108,7 @@ div_ = register(
         broken=True,
         surface=False,
         doc="The quotient of two numbers.",
+        magnitude=of_quotient,
         partials=_quotient_partials,
         domain=((-1e6, 1e6), (1e-6, 1e6)),
         edges=lambda a, b: (b,),
@@ -118,6 +126,7 @@ pow_entry = register(
         broken=True,
         topic="Roots, exponentials, logarithms, powers",
         doc="A base to a real exponent, the same as `base ^ exponent`. A negative base takes whole exponents only.",
+        magnitude=of_power,
         partials=_power_partials,
         domain=((1e-3, 1e3), (-20.0, 20.0)),
         edges=_power_edges,

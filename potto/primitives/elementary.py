@@ -7,6 +7,7 @@ import math
 from potto.core.terms import HALF, NAN, ONE, Term, add, branch, div, mul, prim, sub
 from potto.primitives.bounds import exponential, share, slack
 from potto.primitives.registry import Elementwise, Primitive, Quantity, Terms, always, register
+from potto.primitives.sizes import of_exponential, of_growth, of_logarithm, of_logarithm_from_one, of_root
 
 
 def _root_remainder(ops: Elementwise, m: Quantity, d: Quantity) -> Quantity:
@@ -38,6 +39,7 @@ sqrt = register(
         within=(0.0, math.inf),
         roots=(0.0,),
         remainder=_root_remainder,
+        magnitude=of_root,
         doc="The square root, of numbers that are not negative.",
         partials=lambda x: (div(HALF, prim("sqrt", x)),),
         domain=((0.0, 1e12),),
@@ -61,6 +63,7 @@ exp = register(
         roots=(),
         values=((0.0, 1.0),),
         remainder=_exp_remainder,
+        magnitude=of_exponential,
         exponents=lambda x: (x,),
         doc="The exponential function.",
         partials=lambda x: (prim("exp", x),),
@@ -83,6 +86,7 @@ log = register(
         broken=True,
         roots=(1.0,),
         remainder=lambda ops, m, d: _log_remainder(ops, share(ops, m, d)),
+        magnitude=of_logarithm,
         doc="The natural logarithm, of positive numbers.",
         partials=lambda x: (div(ONE, x),),
         domain=((1e-300, 1e300),),
@@ -107,6 +111,7 @@ log1p = register(
         broken=True,
         roots=(0.0,),
         remainder=lambda ops, m, d: _log_remainder(ops, share(ops, 1 + m, d)),
+        magnitude=of_logarithm_from_one,
         doc="log(1 + x), to full precision also for small x.",
         partials=lambda x: (div(ONE, add(ONE, x)),),
         domain=((-0.999, 1e12),),
@@ -130,6 +135,7 @@ expm1 = register(
         image=(-1.0, math.inf),
         roots=(0.0,),
         remainder=_exp_remainder,
+        magnitude=of_growth,
         exponents=lambda x: (x,),
         doc="exp(x) - 1, to full precision also for small x.",
         partials=lambda x: (prim("exp", x),),  # expm1(x) + 1 has no digits left for x far below 0

@@ -11,6 +11,7 @@ import math
 from potto.core.terms import ONE, TWO, ZERO, add, const, mul, neg, prim
 from potto.primitives.bounds import clear
 from potto.primitives.registry import Elementwise, Ends, Primitive, Quantity, WhereTrue, register
+from potto.primitives.sizes import of_gamma
 
 TOPIC = "The gamma function"
 POSITIVE = (0.0, math.inf)
@@ -50,6 +51,7 @@ gamma = register(
         roots=(),
         values=((1.0, 1.0), (2.0, 1.0)),
         remainder=_gamma_remainder,
+        magnitude=of_gamma,
         example="gamma(0.5)",
     )
 )

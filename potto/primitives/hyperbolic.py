@@ -7,6 +7,7 @@ import math
 from potto.core.terms import HALF, ONE, Term, add, branch, const, div, mul, neg, prim, sub
 from potto.primitives.bounds import clear, rising, waves
 from potto.primitives.registry import Elementwise, Primitive, Quantity, Terms, always, register
+from potto.primitives.sizes import of_even_growth, of_odd_growth
 
 
 def _asinh_remainder(ops: Elementwise, m: Quantity, d: Quantity) -> Quantity:
@@ -36,6 +37,7 @@ sinh = register(
         roots=(0.0,),
         parity=-1,
         remainder=waves("sinh", "cosh"),
+        magnitude=of_odd_growth,
         exponents=lambda x: (x,),
         doc="The hyperbolic sine.",
         partials=lambda x: (prim("cosh", x),),
@@ -62,6 +64,7 @@ cosh = register(
         parity=1,
         values=((0.0, 1.0),),
         remainder=waves("cosh", "sinh"),
+        magnitude=of_even_growth,
         exponents=lambda x: (x,),
         doc="The hyperbolic cosine.",
         partials=lambda x: (prim("sinh", x),),

@@ -12,6 +12,7 @@ from itertools import combinations
 from potto.core.terms import ONE, ZERO, Term, add, branch, const, div, mul, neg, prim, sub
 from potto.primitives.bounds import ends, extreme
 from potto.primitives.registry import Elementwise, Ends, Primitive, Quantity, Terms, register
+from potto.primitives.sizes import of_same_size
 
 
 def _absolute_roots(y: Term) -> Terms:
@@ -84,6 +85,7 @@ absolute = register(
         roots=(0.0,),
         parity=1,
         doc="The absolute value.",
+        magnitude=of_same_size,
         partials=lambda x: (branch((x,), False, ONE, neg(ONE)),),
         domain=((-1e6, 1e6),),
         kinks=lambda x: (x,),

@@ -51,6 +51,16 @@ class Quantity(Protocol):
 Ends = tuple[Quantity, Quantity]  # lower and upper bounds
 
 
+class Size(Struct, frozen=True):
+    """Where a number lies, and how large it is: bounds of the number, and of the logarithm of its magnitude, which say
+    something also of what is beyond what doubles hold. Infinite where nothing is known."""
+
+    lo: Any
+    hi: Any
+    least: Any
+    most: Any
+
+
 class Elementwise(Protocol):
     """What a rule may do with numbers beside arithmetic, `abs` and comparisons: the same for floats and for arrays."""
 
@@ -131,6 +141,8 @@ class Primitive(Struct, frozen=True):
     Enclosures:
     interval: bounds of its values for arguments within bounds, given the arithmetic and the bounds of each argument;
         a third item says where there is no value. What has `turns` needs none. Rounding is the walker's business.
+    magnitude: given the arithmetic and the `Size` of each argument: bounds of the logarithm of its magnitude. What has
+        finite bounds needs none.
     remainder: given the arithmetic, the orders, m and d: what f(z) has at most beyond f(m) + f'(m) (z - m) in the disc
         |z - m| <= d of the complex plane; nan where it is not analytic there.
     """
@@ -178,6 +190,7 @@ class Primitive(Struct, frozen=True):
     period: Callable[[Term], tuple[Term, Terms]] | None = None
 
     interval: Callable[..., tuple[Any, ...]] | None = None
+    magnitude: Callable[..., tuple[Any, Any]] | None = None
     remainder: Callable[..., Any] | None = None
 
     def places(self, *args: Any) -> Any:

@@ -7,6 +7,7 @@ import math
 from potto.core.terms import ONE, PI, Term, const, div, mul, neg, prim, sub
 from potto.primitives.bounds import rising
 from potto.primitives.registry import Elementwise, Primitive, Quantity, register
+from potto.primitives.sizes import of_bell
 
 SLOPE = div(const(2.0), prim("sqrt", PI))  # of erf at 0
 
@@ -74,6 +75,7 @@ erfc = register(
         roots=(),
         values=((0.0, 1.0),),
         remainder=_bell_remainder,
+        magnitude=of_bell,
         exponents=lambda x: (x,),
         doc="1 - erf(x), to full precision also for large x.",
         partials=lambda x: (neg(_bell(x)),),

@@ -20,6 +20,7 @@ from potto.core.reference.functions import sphericalj
 from potto.core.terms import Const, const, postorder, prim, var
 from potto.integrate.rules.complex_enclosures import DISCS, Form, enclosed
 from potto.integrate.rules.intervals import INTERVALS, enclosure
+from potto.integrate.rules.magnitudes import log_magnitude
 from potto.kernels.support import ARRAYS
 from potto.primitives import EXACT, PRIMITIVES, Primitive
 from potto.primitives.walking import Domain
@@ -28,6 +29,7 @@ DOMAINS: dict[str, Domain[Any]] = {
     "floats": FLOATS, "ranges": RANGES, "intervals": INTERVALS, "discs": DISCS, "arrays": ARRAYS,
 }  # fmt: skip
 NUMERIC = [p for p in PRIMITIVES.values() if not p.truth]
+ROUNDED = 1e-14  # what bounds of logarithms leave out, of themselves
 OF_ONE = [p for p in NUMERIC if p.arity == 1]
 OF_ONE_AND_ORDERS = [p for p in NUMERIC if p.arity == p.orders + 1]
 
@@ -79,7 +81,8 @@ def test_intervals_enclose(primitive: Primitive, data: st.DataObject) -> None:
     names = [f"a{i}" for i in range(len(box))]
     k = primitive.orders
     term = prim(primitive.name, *(const(a) for a, _ in box[:k]), *map(var, names[k:]))
-    ((low, high),) = enclosure((term,), {n: (np.array([a]), np.array([b])) for n, (a, b) in zip(names, box)})
+    batch = {n: (np.array([a]), np.array([b])) for n, (a, b) in zip(names, box)}
+    ((low, high),), log = enclosure((term,), batch), float(np.max(log_magnitude(term, batch)))
     one = ranges(term, dict(zip(names, box)))[term]
     shares = [(s,) * len(box) for s in (0.0, 0.5, 1.0)]
     shares += data.draw(st.lists(st.tuples(*(st.floats(0, 1) for _ in box)), min_size=4, max_size=4))
@@ -93,6 +96,7 @@ def test_intervals_enclose(primitive: Primitive, data: st.DataObject) -> None:
         assert one.lo <= value <= one.hi, (point, value)
         assert one.zero or value != 0
         assert primitive.image[0] <= value <= primitive.image[1]
+        assert not value or mp.log(abs(value)) <= log + ROUNDED * (1 + abs(log)), (point, value)
 
 
 @pytest.mark.parametrize("primitive", [p for p in OF_ONE_AND_ORDERS if p.analytic and p.remainder], ids=by_name)

@@ -240,9 +240,12 @@ class _Search:
 def centers(node: Prim) -> tuple[Term, ...]:
     """Terms around whose zeros a builtin may be concentrated, if a part of its argument is steep."""
     centered = PRIMITIVES[node.op].centered
-    if not centered and node.op not in ("exp", "div"):
+    if node.op == "pow" and not node.args[0].free:
+        where = node.args[1]
+    elif centered or node.op in ("exp", "div"):
+        where = node.args[1] if node.op == "div" else node.args[0]
+    else:
         return ()
-    where = node.args[1] if node.op == "div" else node.args[0]
     if not where.free:
         return ()
     if centered:

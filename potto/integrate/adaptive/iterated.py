@@ -239,8 +239,7 @@ class Iteration(Struct):
             exponents, singular = self.plan.exponents[number], self.plan.singular[number]
             inner = self.plan.levels[number + 1 :]
             if exponents is not None:
-                beside = [row for row in rows if row.cut >= 0 and not level.level.cuts[row.cut].center]
-                rows += layer_rows(exponents, inner, level.variable, env, lo, hi, beside, batch, machine)
+                rows += layer_rows(exponents, inner, level.variable, env, lo, hi, rows, batch, machine)
             if singular is not None:
                 rows += dip_rows(singular, inner, level.variable, env, lo, hi, batch, machine)
         return lo, hi, rows + shells(lo, hi, rows, batch), lost

@@ -15,7 +15,7 @@ import numpy as np
 
 from potto.calculus.solving.enclosable import enclosable
 from potto.core.terms import Const, Prim, Term, postorder
-from potto.integrate.decomposition.lines import Watched, box_of, on_lines
+from potto.integrate.decomposition.lines import Watched, apart, box_of, on_lines
 from potto.integrate.decomposition.meetings import Row, as_array
 from potto.integrate.levels import HINT, LevelPlan
 from potto.integrate.pieces import Evaluator
@@ -79,7 +79,7 @@ def dip_rows(
     search = _Search(terms, inner, variable, env, machine, low, length)
     term, part, member, place = search.least(there)
     found = []
-    for numbers in _apart(term, part, member):
+    for numbers in apart(member):
         x, own = place[numbers], member[numbers]
         for away in search.widths(term[numbers], part[numbers], own, x):
             inside = (away > low[own]) & (away < low[own] + length[own])
@@ -179,15 +179,3 @@ class _Search:
                 found.append(u + np.where(near, way * far, np.nan))
                 far = GROWTH * far
         return [self.low[members] + self.length[members] * place for place in found]
-
-
-def _apart(term: Ints, part: Ints, member: Ints) -> list[Ints]:
-    """Numbers of what was found, such that each member is among them once."""
-    seen: dict[int, int] = {}
-    rows: list[list[int]] = []
-    for number, own in enumerate(member.tolist()):
-        turn = seen[own] = seen.get(own, -1) + 1
-        if turn == len(rows):
-            rows.append([])
-        rows[turn].append(number)
-    return [np.asarray(row) for row in rows]

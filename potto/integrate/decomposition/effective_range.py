@@ -20,7 +20,6 @@ from potto.integrate.plan import Plan
 from potto.integrate.rules.gauss import EPS
 from potto.integrate.rules.intervals import ANYTHING, Interval, enclosure
 from potto.integrate.rules.magnitudes import log_magnitude
-from potto.integrate.rules.steepness import exponents_in
 from potto.integrate.rules.substitution import Segments, choose
 from potto.kernels.cells import Array, Cell, Ints, Value
 
@@ -202,7 +201,7 @@ class _Range:
         lo, hi = (np.broadcast_to(end, ends[0].shape) for end in enclosure((self.body,), box)[0])
         unknown = np.isnan(lo)
         size = np.where(unknown, 0.0, np.maximum(np.abs(lo), np.abs(hi)))
-        if len(exponents_in(self.body)) > 1 and unknown.any():  # 0 times what overflows
+        if unknown.any():  # 0 times what overflows
             size = np.where(unknown, self.by_logarithms(ends), size)
         within = volume[:, None]
         if np.isinf(volume).any():  # ranges further in that grow with this variable
@@ -211,8 +210,8 @@ class _Range:
             return np.where(size == 0, 0.0, size * np.abs(ends[1] - ends[0]) * within)
 
     def by_logarithms(self, ends: tuple[Array, Array]) -> Array:
-        """How large the integrand is at most between places (B, places), a piece at a time; 0 where that is not known.
-        Beyond HUGE, where shells are long and exponents beyond what numbers hold, nothing if it fell off before."""
+        """How large the integrand is at most between places (B, places), a piece at a time. Beyond HUGE, where
+        shells are long and exponents beyond what numbers hold, nothing if it fell off before."""
         shape = ends[0].shape
         known = np.maximum(np.abs(ends[0]), np.abs(ends[1])) <= HUGE
         near = np.flatnonzero(known.any(axis=0))
@@ -224,7 +223,7 @@ class _Range:
             one, other = (part.reshape(shape[0], -1) for part in (grid[..., :-1], grid[..., 1:]))
             box = {**self.box, self.level.variable: (np.minimum(one, other), np.maximum(one, other))}
             found = np.broadcast_to(log_magnitude(self.body, box), one.shape).reshape(*grid.shape[:2], PIECES)
-            bound[:, near] = np.where(np.isinf(found), -np.inf, found).max(axis=2)
+            bound[:, near] = found.max(axis=2)
             held = np.where(known, bound + np.log(np.abs(ends[1] - ends[0])), -np.inf)
             end = np.maximum(known.sum(axis=1, keepdims=True) - 1, 1)
             grows = np.take_along_axis(held, end, axis=1) > np.take_along_axis(held, end - 1, axis=1)

@@ -1,7 +1,7 @@
 """Terms of an integrand along lines: at places of one variable, at parts of the ranges of those further in.
 
-Owns `Watched`, `watched` and `on_lines`. What decides where a variable is cut, beside its surfaces, is found on few
-such lines.
+Owns `Watched`, `watched`, `on_lines` and `apart`. What decides where a variable is cut, beside its surfaces, is found
+on few such lines.
 """
 
 from __future__ import annotations
@@ -77,3 +77,15 @@ def on_lines(
             here[level.variable] = Cell(np.nan_to_num(low + parts * (high - low)))
         values = numbers_at(terms.function, machine, {name: here[name] for name in terms.function.params})
         return np.stack([np.broadcast_to(value.v, parts.shape).reshape(shape) for value in values])
+
+
+def apart(member: Ints) -> list[Ints]:
+    """Numbers of what was found of members, such that each member is among them once."""
+    seen: dict[int, int] = {}
+    rows: list[list[int]] = []
+    for number, own in enumerate(member.tolist()):
+        turn = seen[own] = seen.get(own, -1) + 1
+        if turn == len(rows):
+            rows.append([])
+        rows[turn].append(number)
+    return [np.asarray(row) for row in rows]

@@ -1,63 +1,73 @@
-"""How large a term is at most, by its logarithm: also where parts of it are beyond what doubles hold.
+"""How large a term is, by its logarithm: also where parts of it are beyond what doubles hold.
 
 Owns `log_magnitude`. exp(-x^2/2)*exp(10*x) is next to nothing at 100, though an enclosure has 0 times infinity there;
-exp(-x)*exp(x) is 1.
+exp(-x)*exp(x) is 1. What builtins do with sizes is a rule of theirs.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from potto.core.terms import Const, Prim, Term, children, postorder, prim
-from potto.integrate.rules.intervals import Interval, enclosure
-from potto.primitives import PRIMITIVES
+from potto.core.terms import Branch, Const, If, Prim, Term
+from potto.integrate.rules.intervals import INTERVALS, Interval, marked
+from potto.kernels.support import OPS
+from potto.primitives import PRIMITIVES, Primitive
+from potto.primitives.registry import Size
+from potto.primitives.walking import Domain, Rule
+
+UNKNOWN = Size(-np.inf, np.inf, -np.inf, np.inf)
+SMALLEST = 2.0**-1000  # from which on doubles have all digits: below, a bound of 0 may be one of what is not nothing
 
 
 def log_magnitude(term: Term, box: Mapping[str, Interval]) -> Any:
     """A bound of log(abs(term)) over a box; infinite where none is known."""
-    found: dict[Term, Any] = {}
     with np.errstate(all="ignore"):
-        for node in postorder(term, below=_parts):
-            own = _of(node, found, box)
-            found[node] = np.where(np.isnan(own), np.inf, own)
-    return found[term]
+        env = {name: _sized(ends, (-np.inf, np.inf)) for name, ends in box.items()}
+        return SIZES.walk((term,), env, {})[0].most
 
 
-def _parts(node: Term) -> Sequence[Term]:
-    return children(node) if isinstance(node, Prim) and node.op in _KNOWN else ()
+def _sized(ends: Interval, logs: tuple[Any, Any]) -> Size:
+    """What bounds and logarithms say together."""
+    lo, hi = (np.where(np.isnan(end), far, end) for end, far in zip(ends, (-np.inf, np.inf), strict=True))
+    farthest, nearest = np.maximum(-lo, hi), np.maximum(np.maximum(lo, -hi), 0.0)
+    least, most = (np.where(np.isnan(log), far, log) for log, far in zip(logs, (-np.inf, np.inf), strict=True))
+    most = np.where(farthest >= SMALLEST, np.fmin(most, np.log(farthest)), most)
+    return Size(lo, hi, np.fmax(least, np.log(nearest)), most)
 
 
-def _of(node: Term, found: Mapping[Term, Any], box: Mapping[str, Interval]) -> Any:
-    if isinstance(node, Prim) and node.op in _KNOWN:
-        below = [found[arg] for arg in node.args]
-        match node.op:
-            case "exp":
-                return enclosure(node.args, box)[0][1]
-            case "add":
-                return np.max(np.broadcast_arrays(*below), axis=0) + np.log(len(below))
-            case "neg" | "abs":
-                return below[0]
-            case "sqrt":
-                return 0.5 * below[0]
-            case "mul":
-                nothing = np.any(np.broadcast_arrays(*(part == -np.inf for part in below)), axis=0)
-                return np.where(nothing, -np.inf, sum(below[1:], below[0]))
-            case "gamma":
-                return enclosure((prim("lgamma", *node.args),), box)[0][1]
-            case "log" | "log1p":
-                least, _ = enclosure((node,), box)[0]
-                return np.log(np.maximum(np.abs(np.where(np.isnan(least), below[0], least)), np.abs(below[0]) + 1.0))
-            case _:
-                exponent = node.args[1]
-                if isinstance(exponent, Const) and exponent.value > 0:
-                    return exponent.value * below[0]
-    least, most = enclosure((node,), box)[0]
-    if isinstance(node, Prim) and (exponents := PRIMITIVES[node.op].exponents(*node.args)) and np.any(np.isnan(least)):
-        return np.max(np.broadcast_arrays(*map(np.abs, enclosure(exponents, box)[0])), axis=0)
-    return np.log(np.maximum(np.abs(least), np.abs(most)))
+class _Sizes(Domain[Size]):
+    """Bounds of numbers and of their logarithms, by the rules of the entries."""
+
+    def constant(self, node: Const) -> Size:
+        log = np.log(np.abs(node.value))
+        return Size(np.float64(node.value), np.float64(node.value), log, log)
+
+    def unknown(self) -> Size:
+        return UNKNOWN
+
+    def rule(self, entry: Primitive) -> Rule[Size] | None:
+        return None
+
+    def builtin(self, node: Prim, known: Mapping[Term, Size]) -> Size:
+        args = [known[arg] for arg in node.args]
+        ends = INTERVALS.builtin(node, {arg: marked(x.lo, x.hi) for arg, x in zip(node.args, args, strict=True)})
+        rule = PRIMITIVES[node.op].magnitude
+        if rule is not None:
+            return _sized(ends, rule(OPS, *args))
+        whole = self.apply(node.op, args)
+        return _sized(ends, (whole.least, whole.most))
+
+    def other(self, node: Term, known: Mapping[Term, Size]) -> Size:
+        if not isinstance(node, Branch | If):
+            return UNKNOWN
+        a, b = known[node.then], known[node.orelse]
+        return Size(*(pick(x, y) for pick, x, y in (
+            (np.minimum, a.lo, b.lo), (np.maximum, a.hi, b.hi), (np.minimum, a.least, b.least),
+            (np.maximum, a.most, b.most),
+        )))  # fmt: skip
 
 
-_KNOWN = frozenset(("exp", "add", "neg", "abs", "sqrt", "mul", "log", "log1p", "pow", "gamma"))
+SIZES = _Sizes()

@@ -1,0 +1,82 @@
+"""What happens within a stretch too short for nodes, beside something smooth that they see: transitions, peaks, pairs
+of peaks that cancel, in all spellings, on finite and infinite ranges. Values, and slopes by where they are."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from mpmath import mp
+
+import potto
+
+STEP = mp.mpf(2) ** -40  # of t along the imaginary axis: what becomes imaginary is the slope, off by its square
+
+
+def across(f: Callable[..., Any], low: Any, high: Any) -> Callable[[Any, Any], Any]:
+    """The integral of f(s, t, k) over x = t + s from low to high, by panels that double in length from t on."""
+
+    def run(k: Any, t: Any) -> Any:
+        at, off = t.real, t.imag * 1j
+        steps = [2**n / mp.mpf(k) for n in range(-1, 60, 2) if 2**n < high * k]
+        ends = sorted({low - at, high - at, mp.mpf(0), *(s * sign for s in steps for sign in (-1, 1))})
+        ends = [s for s in ends if low - at <= s <= high - at]
+        return mp.quad(lambda s: f(s - off, t, k), ends, maxdegree=4, method="gauss-legendre")
+
+    return run
+
+
+def logistic(u: Any) -> Any:
+    return 1 / (1 + mp.exp(u))
+
+
+FEATURES: dict[str, tuple[str, Callable[[Any, Any], Any]]] = {
+    "a peak in t^2": (
+        "integral [0, 1] 1/(2 + x) + 1/cosh(k*(x^2 - t^2))^2 d(x)",
+        across(lambda s, t, k: 1 / (2 + t + s) + mp.sech(k * s * (s + 2 * t)) ** 2, 0, 1),
+    ),
+    "two that cancel": (
+        "integral [0, 1] exp(x) + (x - t)*exp(-k*k*(x - t)^2) d(x)",
+        lambda k, t: mp.e - 1 + (mp.exp(-((k * t) ** 2)) - mp.exp(-((k * (1 - t)) ** 2))) / (2 * k * k),
+    ),
+    "a high power": (
+        "integral [0, 1] exp(x) + cos(x - t)^5e9 d(x)",
+        lambda k, t: mp.e - 1 + mp.sqrt(mp.pi) * mp.gammaprod([2.5e9 + 0.5], [2.5e9 + 1]),
+    ),
+    "a power of 2": (
+        "integral [0, 1] exp(x) + 2^(-(k*(x - t))^2) d(x)",
+        lambda k, t: mp.e - 1 + mp.sqrt(mp.pi / mp.log(2)) / k,
+    ),
+    "a step in a normal": (
+        "integral (x ~ normal(0, 1)) x + erf(k*(x - t)) d(x)",
+        lambda k, t: -mp.erf(k * t / mp.sqrt(1 + 2 * mp.mpf(k) ** 2)),
+    ),
+    "a step that falls, to infinity": (
+        "integral [0, inf] exp(-x)*(1 + erf(k*(t - x))) d(x)",
+        lambda k, t: 1 + mp.erf(k * t) - mp.exp(1 / (4 * mp.mpf(k) ** 2) - t) * mp.erfc(1 / (2 * mp.mpf(k)) - k * t),
+    ),
+    "two exponentials that grow": (
+        "integral [0, inf] exp(-x)*(x + 1/(exp(k*(t - x)) + exp(k*(x - t)))) d(x)",
+        across(lambda s, t, k: mp.exp(-t - s) * (t + s + mp.sech(k * s) / 2), 0, mp.mpf(60)),
+    ),
+    "one beside a density": (
+        "integral (x ~ exponential(1)) 1 + exp(-x)/(1 + exp(k*(x^3 - t^3))) d(x)",
+        across(lambda s, t, k: mp.exp(-t - s) * (
+            1 + mp.exp(-t - s) * logistic(k * s * (s * s + 3 * s * t + 3 * t * t))), 0, mp.mpf(60)),
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", FEATURES)
+def test_what_lies_between_nodes_is_seen(name: str) -> None:
+    program, exact = FEATURES[name]
+    f = potto.compile(f"def f(k, t)\n    {program}").f
+    k, t = 24_600.0, 0.3071
+    found = potto.deriv(f)((k, 0.0), (t, 1.0))
+    with mp.workdps(30):
+        exact_value = exact(k, mp.mpc(t, STEP))
+        value, slope = exact_value.real, exact_value.imag / STEP
+    for got, error, right in ((f(k, t).value, f(k, t).error, value), (found.tangent, found.tangent_error, slope)):
+        assert abs(got - right) <= error + 1e-15
+        assert error <= 1e-7  # a cosine to the power of 5e9 is rounded to 1e-6 of itself
