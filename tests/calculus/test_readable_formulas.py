@@ -290,3 +290,22 @@ def test_a_sign_under_an_integral_makes_a_size() -> None:
     shown = Shown("def f(t) integral ([-1, 1], [-1, 1]) [x*y < t] d(x, y)\n", "f")
     assert "1/abs(x)*[" in shown.text.tangent
     assert shown.module().eval("shown_1(-0.25, 1)").value == pytest.approx(2 * log(4), abs=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("function", "read"),
+    [
+        ("f(t, m) integral [0, 1] abs(x - t)*exp(m*x) d(x)",
+         "exp(m*x)*((if [x < t] then 1 else -1)*dt + x*abs(x - t)*dm)"),
+        ("f(n, k) integral [-n, n] (if [r > 0] then -k else k)/(2*n) d(r)",
+         "(if [r > 0] then 1 else -1)*(k*dn - n*dk)/(2*n^2)"),
+        ("f(t) integral ([0, 1], [0, 1]) x*t*[0.1*x + 0.1 < 0.6*y] d(x, y)", "x*dt*[x + 1 < 6*y]"),
+        ("f(y, r, z) integral [0, 1] exp(y*(r - x)/2 + x*sin(z))*exp(y*(r - x)/2 + x*sin(r)) d(x)",
+         "exp(x*sin(r) + x*sin(z) + y*(r - x))*((r - x)*dy + (y + x*cos(r))*dr + x*cos(z)*dz)"),
+    ],
+)  # fmt: skip
+def test_opposite_sides_tenths_and_exponents_are_told_once(function: str, read: str) -> None:
+    """1 comes before -1, conditions compare whole numbers, and what exponents share is added up."""
+    library = Library()
+    file = library.put("<text>", f"def {function}\n")
+    assert explain_derivative(library.db, file, "f").integrals[0].interior == read

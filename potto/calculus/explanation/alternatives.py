@@ -12,16 +12,20 @@ from fractions import Fraction
 
 from potto.calculus.algebra.ranges import Box, range_of
 from potto.calculus.algebra.rational_form import equal
-from potto.calculus.explanation.brackets import constant
+from potto.calculus.explanation.brackets import constant, turned_round
 from potto.calculus.explanation.factors import Factors, factored
-from potto.calculus.explanation.products import written
+from potto.calculus.explanation.products import is_negative, written
 from potto.core.terms import (
+    ONE,
     ZERO,
     Branch,
+    Const,
     If,
     Prim,
     Term,
+    Tuple,
     add,
+    branch,
     children,
     mul,
     neg,
@@ -40,8 +44,13 @@ def in_one(node: If | Branch, tangents: frozenset[str], inside: frozenset[str], 
     known = holds(node.condition) if isinstance(node, If) else None
     if known is not None:
         return node.then if known else node.orelse
-    whole = _of_size(node, tangents, inside) if isinstance(node, Branch) and len(node.coordinates) == 1 else None
-    return min((node, _apart(node, tangents)) if whole is None else (node, whole), key=cost)
+    apart = _apart(node, tangents)
+    if isinstance(node, Branch) and len(node.coordinates) == 1:
+        if (whole := _of_size(node, tangents, inside)) is not None:
+            return min(node, whole, key=cost)
+        if (whole := _of_sign(node, tangents)) is not None:
+            return min(whole, apart, node, key=cost)
+    return min(node, apart, key=cost)
 
 
 def holds(condition: Term, box: Box | None = None) -> bool | None:
@@ -129,6 +138,20 @@ def _of_size(node: Branch, tangents: frozenset[str], inside: frozenset[str]) -> 
     if vanishes and surface.free.isdisjoint(inside) and equal(then, neg(orelse)):
         return written(factored(mul(prim("sign", surface), then)), tangents)
     return None
+
+
+def _of_sign(node: Branch, tangents: frozenset[str]) -> Term | None:
+    """What is the other side's negative as a product with 1 and -1, the 1 first."""
+    first, other = node.then, node.orelse
+    tuples = any(isinstance(side, Tuple) for side in (first, other))
+    if tuples or first.free != other.free or not equal(first, neg(other)):
+        return None
+    surface, strict = node.surface, node.strict
+    if is_negative(first) or (isinstance(first, Const) and first.value < 0):
+        first, surface, strict = other, turned_round(surface), not strict
+    whole = factored(first)
+    whole.times(branch((surface,), strict, ONE, neg(ONE)), 1)
+    return written(whole, tangents)
 
 
 def _replaced(term: Term, old: Term, new: Term) -> Term:

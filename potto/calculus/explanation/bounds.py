@@ -15,6 +15,7 @@ from msgspec import Struct
 
 from potto.calculus.algebra.rational_form import as_term, normal
 from potto.calculus.explanation.brackets import Inequality, constant, multiplied_out
+from potto.calculus.explanation.decimals import decimal
 from potto.calculus.explanation.squares import root_of_square, squares_in
 from potto.core.polynomials import Polynomial, number
 from potto.core.printer import format_term, sides_of
@@ -139,7 +140,7 @@ def _bound(surface: Term) -> _Bound | None:
     found = normal(surface)
     if found is None or set(found.below) != {()}:
         return None
-    top = {m: Fraction(c) / found.below[()] for m, c in found.top.items()}
+    top = {m: decimal(Fraction(c)) / found.below[()] for m, c in found.top.items()}
     offset = top.pop((), Fraction(0))
     if not 0 < len(top) <= _MONOMIALS:
         return None

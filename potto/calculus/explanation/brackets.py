@@ -1,8 +1,8 @@
 """Iverson brackets as conditions, in as few and as plain comparisons as they can be told.
 
-Owns `Inequality`, `conditions`, `fewer`, `plainer`, `sign_where`, `two_sides`, `constant` and `implies`; how
-they are written is in `bounds`. A root is compared by squares or by what it is the root of, factors that do not change
-a sign are left out, and so is what another condition implies.
+Owns `Inequality`, `conditions`, `turned_round`, `fewer`, `plainer`, `sign_where`, `two_sides`, `constant` and
+`implies`; how they are written is in `bounds`. A root is compared by squares or by what it is the root of, factors that
+do not change a sign are left out, and so is what another condition implies.
 """
 
 from __future__ import annotations
@@ -59,14 +59,15 @@ def conditions(term: Term) -> list[Inequality] | None:
             found.append(Inequality(term.surface, term.strict))
             term = term.then
         elif term.then is ZERO:
-            found.append(Inequality(_turned(term.surface), not term.strict))
+            found.append(Inequality(turned_round(term.surface), not term.strict))
             term = term.orelse
         else:
             return None
     return found
 
 
-def _turned(surface: Term) -> Term:
+def turned_round(surface: Term) -> Term:
+    """Its negative, summand by summand."""
     return add(*map(neg, surface.args)) if isinstance(surface, Prim) and surface.op == "add" else neg(surface)
 
 

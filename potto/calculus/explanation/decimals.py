@@ -1,6 +1,6 @@
 """Numbers of a formula as a person would write them, where a computer has rounded.
 
-Owns `in_decimals`, `over_whole_numbers` and `root_of_number`.
+Owns `in_decimals`, `decimal`, `over_whole_numbers` and `root_of_number`.
 """
 
 from __future__ import annotations
@@ -34,6 +34,12 @@ def in_decimals(term: Term) -> Term:
                 return new
 
     return transform(term, change)
+
+
+def decimal(value: Fraction) -> Fraction:
+    """1/10 for what a computer makes of it; a number that no computer's is stays."""
+    near = float(value)
+    return Fraction(repr(near)) if isfinite(near) and Fraction(near) == value else value
 
 
 def over_whole_numbers(term: Term) -> Term:

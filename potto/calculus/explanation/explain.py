@@ -240,8 +240,7 @@ def _integral(
 
     node, around = plainly_indexed(plainly_named(node, words.names), around, words.names)
     inside = {n: t for n, t in tangents.items() if n not in node.variables}
-    indices = [name for name, _, _ in around]
-    names, ranges = (*node.variables, *indices), _ranges(around)
+    indices, ranges = [name for name, _, _ in around], _ranges(around)
     box = {**ranges, **box_of(node)}
     deltas, meeting, bounds, boundary = list[str](), list[str](), list[str](), tuple[str, ...]()
     interior, reason = "", ""
@@ -249,7 +248,7 @@ def _integral(
     def under(term: Term) -> str:
         if sum(map(len, (interior, *deltas))) > _MOST:
             raise NoFormula("the formula is too long to be shown")
-        return words.under_integral(term, *names, box=box)
+        return words.under_integral(term, *node.variables, *indices, box=box)
 
     try:
         interior = under(rate(node.body))
@@ -265,26 +264,29 @@ def _integral(
         reason = "" if plain is None else _why_searched(plain)
         if plain is not None and level_set(plain) is None:
             bounds = [words.text(t, *indices, box=ranges) for t in at_bounds(plain, rate)]
-            bounds = [text for text in bounds if text != "0"]
             boundary = _swept(plain, inside, rate, words, indices, ranges)
     except (NoClosedForm, NotSmooth, NoFormula) as problem:
         reason = str(problem)
     except PottoError as problem:
         reason = problem.diagnostics[0].message
-    head = words.notation.text(words.notation.fields(integral(node.variables, node.bounds, ONE))).rpartition(" 1 ")[0]
     return IntegralText(
-        head,
+        _head(node, words.notation),
         ", ".join(node.variables),
         words.plain(node.body),
         interior,
         tuple(deltas),
-        tuple(bounds),
-        tuple(b for b in boundary if b != "0"),
+        tuple(text for text in bounds if text != "0"),
+        tuple(text for text in boundary if text != "0"),
         _surfaces(node, inside, words),
         reason,
         tuple(meeting),
         ", ".join(f"{name} in {words.plain(lo)}..{words.plain(hi)}" for name, lo, hi in around),
     )
+
+
+def _head(node: Integral, notation: Notation) -> str:
+    """`integral` and the bounds, without what stands under it."""
+    return notation.text(notation.fields(integral(node.variables, node.bounds, ONE))).rpartition(" 1 ")[0]
 
 
 def _swept(

@@ -7,10 +7,11 @@ by the conditions beside them, where these do.
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from fractions import Fraction
 
-from potto.calculus.algebra.rational_form import as_term, normal
+from potto.calculus.algebra.rational_form import as_term, normal, shorter
 from potto.calculus.explanation.bounds import bracket
 from potto.calculus.explanation.brackets import (
     NEVER,
@@ -196,7 +197,7 @@ def written(found: Factors, tangents: frozenset[str]) -> Term:
     top = sorted(place, key=place.__getitem__)
     below = sorted((b for b, n in found.powers.items() if n < 0), key=_order)
     scale, divisor = _scale(abs(found.coefficient), bool(below))
-    exponent = [prim("exp", add(*found.exponents))] if found.exponents else []
+    exponent = [prim("exp", _exponent(found.exponents))] if found.exponents else []
     plain = [b for b in top if place[b][0] == _PLAIN]
     led = [b for b in plain if place[b][1][0] <= 1 and found.powers[b].denominator == 1]
     above = [*_powers(found, led, 1), *exponent, *_powers(found, [b for b in plain if b not in led], 1)]
@@ -210,6 +211,18 @@ def written(found: Factors, tangents: frozenset[str]) -> Term:
     fraction = div(mul(scale, *above, *moving, *halved), mul(*under))
     whole = mul(fraction, *(integrals if not halved else ()), *held, *deltas)
     return neg(whole) if found.coefficient < 0 else whole
+
+
+def _exponent(parts: Sequence[Term]) -> Term:
+    """The sum of exponents, the same however these come: what stands in it twice is told once."""
+    if len(parts) == 1:
+        return parts[0]
+    sums = (part.args if isinstance(part, Prim) and part.op == "add" else (part,) for part in parts)
+    count = Counter(arg for each in sums for arg in each)
+    several = {arg for arg, n in count.items() if n > 1}
+    each = [written(factored(mul(const(float(count[arg])), arg)), frozenset()) if arg in several else arg
+            for arg in sorted(count, key=format_term)]  # fmt: skip
+    return shorter(add(*each))
 
 
 def _powers(found: Factors, bases: Iterable[Term], sign: int) -> list[Term]:

@@ -288,7 +288,7 @@ class _Work:
                 other = self.node(neg(choice.surface))
                 whole = self.node(mul(orelse, branch((other,), not choice.strict, ONE, ZERO)))
             else:
-                whole = branch(choice.coordinates, choice.strict, then, orelse)
+                whole = self.node(branch(choice.coordinates, choice.strict, then, orelse))
             yield add(whole, others)
 
     def _of_squares(self, node: Prim) -> list[Term]:
