@@ -24,6 +24,7 @@ from potto.calculus.surfaces.finding import Finding, Resolve
 from potto.core.packing import packed
 from potto.core.terms import Integral, Lam, Term, function_of, tuple_
 from potto.integrate.decomposition.arrangements import Arrangement, arrangement_of
+from potto.integrate.decomposition.lifted_rows import LiftedRows, lifted
 from potto.integrate.decomposition.vanishing import Vanishing, held, vanishing_of
 from potto.integrate.levels import Group, LevelPlan, group_levels
 
@@ -55,6 +56,11 @@ class Outline(Struct, frozen=True, dict=True):
     kinks: Lam = NO_KINKS
     steps: int = 0
     arrangement: Arrangement | None = None
+
+    @cached_property
+    def lifted(self) -> tuple[tuple[LiftedRows, ...], ...]:
+        """By variable the cuts of which it is known from which places in space they come."""
+        return lifted(self.levels, self.arrangement)
 
     @cached_property
     def packed(self) -> bytes:
@@ -101,7 +107,7 @@ def outlined(
         return held(vanishing_of(term.body, paths, resolve=resolve))
 
     levels, groups = group_levels(sweep(term, found, resolve, findings, True, over, holds).levels)
-    searched = any(own.level.critical for own in levels)
+    told = any(own.level.critical for own in levels) or len(levels) > 2
     numbers = {j.path: (g.number, j.orientation) for g in groups for j in g.cut.jumps}
     return Outline(
         term,
@@ -114,7 +120,7 @@ def outlined(
         _doublings(term, found),
         _may_fold(term, levels),
         *_kinks(term, found, findings, mixed),
-        arrangement_of(term.body, groups, resolve) if over is None and searched else None,
+        arrangement_of(term.body, groups, resolve) if over is None and told else None,
     )
 
 

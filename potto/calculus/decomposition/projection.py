@@ -21,6 +21,7 @@ from potto.calculus.decomposition.critical import (
     scattered,
     shadows,
 )
+from potto.calculus.decomposition.lifts import Lift, crossed, turned
 from potto.calculus.decomposition.strata import Stratum, known, met
 from potto.calculus.decomposition.surface_cuts import RATIONAL, Cut, along, sections_in
 from potto.calculus.solving.enclosable import slope_of
@@ -36,12 +37,13 @@ MOST_SYSTEMS = 600  # whose places are projected further out: pairs of surfaces,
 
 class Shadow(Struct, frozen=True):
     """A surface, whether what is left is like a square root there, whether it jumps, and where in space it comes from,
-    if that is known."""
+    if that is known: on which strata, and at which places."""
 
     surface: Term
     turning: bool
     steps: bool
     strata: tuple[Stratum, ...] = ()
+    lifts: tuple[Lift, ...] = ()
 
 
 class Here(Struct, frozen=True):
@@ -110,7 +112,8 @@ def _at_bounds(cut: Cut, within: Within, steps: bool) -> Iterator[Shadow]:
         if not infinite(bound):
             face = sub(var(within.variable), bound)
             strata = tuple(stratum.on(face) for stratum in cut.strata)
-            yield Shadow(substitute(along(cut), {within.variable: bound}), False, steps, strata)
+            lifts = tuple(lift.on(face, within.variable, bound) for lift in cut.lifts)
+            yield Shadow(substitute(along(cut), {within.variable: bound}), False, steps, strata, lifts)
 
 
 def _turning(cut: Cut, here: Here, steps: bool = False) -> Iterator[Shadow | Critical]:
@@ -127,8 +130,9 @@ def _turning(cut: Cut, here: Here, steps: bool = False) -> Iterator[Shadow | Cri
     if cut.product is None and not (isinstance(found, Sections) and found.complete):
         found = sections_in(cut.key, variable)
     if isinstance(found, Sections):
+        lifts = turned(cut.lifts, surface, variable)
         for turn in found.turning:
-            yield Shadow(turn, True, False, strata)
+            yield Shadow(turn, True, False, strata, lifts)
         for stop in dict.fromkeys(stop for family in found.families for stop in family.stops):
             yield Shadow(substitute(surface, {variable: stop}), True, False)
 
@@ -165,18 +169,19 @@ def _crossings(first: Cut, second: Cut, here: Here, steps: bool = False) -> Iter
     searched = a is None or (
         radical and all(_by_numbers(along(c), here.variable, here.further) for c in (first, second))
     )
-    meetings: list[Term] = []
+    meetings, roots = list[Term](), list[Term]()
     if a is not None:
-        b = second if a is first else first
-        meetings = [simplify(substitute(b.surface, {here.variable: root})) for root in a.roots or ()]
+        b, roots = (second if a is first else first), list(a.roots or ())
+        meetings = [simplify(substitute(b.surface, {here.variable: root})) for root in roots]
     if searched:  # by numbers, where the places are isolated: of two spheres a circle may be at one distance from here
         meetings = [settled(meeting, frozenset((here.nearest,))) for meeting in meetings]
     if a is None or (searched and any(here.nearest in meeting.free for meeting in meetings)):
         yield Critical((along(first), along(second)), (here.within,), False, steps)
         return
-    for meeting in meetings:
+    for meeting, root in zip(meetings, roots, strict=True):
         if meeting.free:
-            yield Shadow(meeting, False, steps, strata or ())
+            lifts = crossed(first.lifts, second.lifts, strata, here.chain, root)
+            yield Shadow(meeting, False, steps, strata or (), lifts)
 
 
 def _vertices(strata: Sequence[Stratum] | None, here: Here, steps: bool) -> list[Critical]:

@@ -15,6 +15,7 @@ from msgspec.structs import replace
 from potto.calculus.algebra.radicals import minus
 from potto.calculus.algebra.ranges import positive
 from potto.calculus.decomposition.critical import Within
+from potto.calculus.decomposition.lifts import Lift, told
 from potto.calculus.decomposition.strata import MOST as MOST_STRATA
 from potto.calculus.decomposition.strata import Stratum
 from potto.calculus.solving.enclosable import slope_of
@@ -57,6 +58,7 @@ class Cut(Struct, frozen=True):
         but covered by others.
     corners: the region whose corners it stands for, instead of a surface.
     strata: where in space it comes from; none where that is not known.
+    lifts: the places there that it may come from; none where these are not known.
     """
 
     surface: Term
@@ -73,6 +75,7 @@ class Cut(Struct, frozen=True):
     covers: int | None = None
     corners: ConicRegion | None = None
     strata: tuple[Stratum, ...] = ()
+    lifts: tuple[Lift, ...] = ()
 
     @property
     def decides(self) -> bool:
@@ -116,7 +119,7 @@ def side(number: int) -> str:
 
 class Placed(Struct):
     """A surface, what it is a product of (up to `sign`), and what is known of it. holds, bends: as a cut has them.
-    strata: where it comes from, of each way in which it was met; nothing in one of them is not known.
+    strata, lifts: where it comes from, of each way in which it was met; nothing in one of them is not known.
     """
 
     face: WrittenSurface
@@ -128,12 +131,18 @@ class Placed(Struct):
     holds: int = 0
     bends: bool = False
     strata: list[tuple[Stratum, ...]] = []
+    lifts: list[tuple[Lift, ...]] = []
 
     @property
     def origin(self) -> tuple[Stratum, ...]:
         """All strata that it comes from; none where that is not known, or they are many."""
         found = dict.fromkeys(stratum for strata in self.strata for stratum in strata)
         return tuple(found) if all(self.strata) and len(found) <= MOST_STRATA else ()
+
+    @property
+    def places(self) -> tuple[Lift, ...]:
+        """All places that it comes from; none where they are not known, or many."""
+        return told(lift for lifts in self.lifts for lift in lifts) if all(self.lifts) else ()
 
 
 @lru_cache(maxsize=8192)
@@ -164,12 +173,12 @@ def cut_of(placed: Placed, variable: str) -> Cut:
         found = all_sections(part, variable)
         if found is None:
             return Cut(surface, key, jumps, turning, None, (), steps, product, holds=placed.holds, bends=placed.bends,
-                       strata=placed.origin)  # fmt: skip
+                       strata=placed.origin, lifts=placed.places)  # fmt: skip
         roots.update(dict.fromkeys((*found.roots, *found.poles)))
         families.update(dict.fromkeys((*found.families, *found.pole_families)))
     sections = tuple(roots), tuple(families)
     return Cut(surface, key, jumps, turning, *sections, steps, product, holds=placed.holds, bends=placed.bends,
-               strata=placed.origin)  # fmt: skip
+               strata=placed.origin, lifts=placed.places)  # fmt: skip
 
 
 def all_sections(part: WrittenSurface, variable: str) -> Sections | None:

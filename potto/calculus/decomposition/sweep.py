@@ -17,6 +17,7 @@ from msgspec.structs import replace
 from potto.calculus.algebra.rational_form import settled
 from potto.calculus.decomposition.conic_regions import Polynomial, conic_region, covering
 from potto.calculus.decomposition.critical import Critical, Within
+from potto.calculus.decomposition.lifts import Lift
 from potto.calculus.decomposition.projection import Here, crossing, further_systems, shadows_of_cuts, shadows_of_roots
 from potto.calculus.decomposition.side_polynomials import by_sides
 from potto.calculus.decomposition.strata import Stratum, own
@@ -81,11 +82,14 @@ class _Pool(Struct):
         elif finding.kind != "step":  # no variable takes part in it
             surface = settled(finding.surface, frozenset(self.variables))
             jump = (finding.path, finding.strict) if finding.kind == "jump" else None
-            self.put(surface, jump, finding.kind == "edge", bends=finding.kind != "jump", strata=own(surface))
+            lifts = (Lift(frozenset((surface,))),)
+            self.put(
+                surface, jump, finding.kind == "edge", bends=finding.kind != "jump", strata=own(surface), lifts=lifts
+            )
 
     def put(
         self, surface: Term, jump: tuple[tuple[int, ...], bool] | None, turning: bool, steps: bool = False,
-        bends: bool = False, strata: tuple[Stratum, ...] = (),
+        bends: bool = False, strata: tuple[Stratum, ...] = (), lifts: tuple[Lift, ...] = (),
     ) -> None:  # fmt: skip
         face, orientation = face_of(surface)
         if not face.key.free:
@@ -99,6 +103,7 @@ class _Pool(Struct):
         placed.steps |= steps
         placed.bends |= bends
         placed.strata.append(strata)
+        placed.lifts.append(lifts)
 
     def hold(self, holds: Holds) -> None:
         """Note the sides outside of which nothing is integrated."""
@@ -210,7 +215,7 @@ def _level(
             if isinstance(shadow, Critical):
                 pool.critical[shadow] = None
             else:
-                pool.put(shadow.surface, None, shadow.turning, shadow.steps, strata=shadow.strata)
+                pool.put(shadow.surface, None, shadow.turning, shadow.steps, strata=shadow.strata, lifts=shadow.lifts)
         pool.critical.update(dict.fromkeys(further_systems(systems, cuts, here)))
         pool.edges.update(dict.fromkeys(_edges(decisive, variable, hints, further)))
     else:

@@ -22,6 +22,7 @@ from potto.integrate.decomposition.cuts import Cuts, at_rest, finite_speeds, fra
 from potto.integrate.decomposition.dips import dip_rows
 from potto.integrate.decomposition.effective_range import Ranges, pulled_in, reaches
 from potto.integrate.decomposition.layers import layer_rows
+from potto.integrate.decomposition.lifted_rows import counting
 from potto.integrate.decomposition.meetings import Row, as_array
 from potto.integrate.decomposition.sections import searched_rows
 from potto.integrate.decomposition.shells import shells
@@ -231,10 +232,12 @@ class Iteration(Struct):
             rows = within_walls(level, rows, env, batch, machine, face)
         if level.covers:
             rows = uncovered(level, rows, env, batch, machine, face)
+        number = next(n for n, own in enumerate(self.plan.levels) if own is level)
+        if (groups := self.plan.outline.lifted[number]) and (arrangement := self.plan.outline.arrangement):
+            rows = counting(groups, level, rows, env, (lo, hi), batch, machine, arrangement, face)
         corners = corner_rows(level, env, lo, hi, batch, machine) if level.corners else []
         found, lost = self.searched(level, env, lo, hi, batch, machine)
         rows = rows + corners + found
-        number = next(n for n, own in enumerate(self.plan.levels) if own is level)
         if self.extent is not None or self.face is not None:  # no line of a sample
             exponents, singular = self.plan.exponents[number], self.plan.singular[number]
             inner = self.plan.levels[number + 1 :]

@@ -30,10 +30,11 @@ from potto.kernels.cells import Array, Bools, Cell, Ints
 
 
 class Arrangement(Struct, frozen=True):
-    """The surfaces with sides, as they were written; what equations have of each, with the numbers of its sides; and
-    what is integrated as a polynomial in these."""
+    """The surfaces with sides, as they were written, the forms by which they are known, and what equations have of
+    each, with the numbers of its sides; and what is integrated as a polynomial in these."""
 
     surfaces: tuple[Term, ...]
+    keys: tuple[Term, ...]
     parts: tuple[Term, ...]
     polynomial: Lam
 
@@ -47,7 +48,8 @@ def arrangement_of(body: Term, groups: Sequence[Group], resolve: Resolve) -> Arr
     polynomial = by_sides(body, sides, resolve)
     if polynomial is None:
         return None
-    return Arrangement(tuple(cut.surface for cut in cuts), tuple(map(along, cuts)), function_of(polynomial))
+    surfaces, keys = (tuple(getattr(cut, name) for cut in cuts) for name in ("surface", "key"))
+    return Arrangement(surfaces, keys, tuple(map(along, cuts)), function_of(polynomial))
 
 
 class Sieve(Struct, frozen=True):
@@ -78,15 +80,16 @@ class Sieve(Struct, frozen=True):
         return found
 
     def _bounding(self, parts: Ints, member: Ints, box: Array) -> Bools:
-        """The same, of boxes in whose systems there are surfaces, (k, P)."""
+        """The same, of boxes in whose systems there are surfaces, (k, P): all of these have to be there."""
         surfaces, count = self.arrangement.surfaces, member.size
-        reach = BESIDE * np.abs(box).max(axis=1).sum(axis=0)
+        reach = BESIDE * np.abs(np.where(np.isfinite(box), box, 0.0)).max(axis=1).sum(axis=0)
         at: dict[str, Interval] = {name: (v[member], v[member]) for name, v in self.at.items()}
         at |= {name: (box[n, 0] - reach, box[n, 1] + reach) for n, name in enumerate(self.names)}
         bounds = enclosure(surfaces, at)
         low, high = (np.stack([np.broadcast_to(ends[end], (count,)) for ends in bounds]) for end in (0, 1))
         near = ~((low > 0) | (high < 0)) | np.array([surface is self.face for surface in surfaces])[:, None]
         place = np.arange(count)
+        there = near[parts, place].all(axis=0)
         near[parts, place] = False
         drawn = np.random.default_rng(0).uniform(LEAST, MOST, (len(surfaces), 1))
         sides = np.where(near, drawn, np.where(low > 0, 1.0, 0.0))
@@ -97,7 +100,7 @@ class Sieve(Struct, frozen=True):
             whole = as_array(number_at(self.arrangement.polynomial, still, env).v, count)
             mixed += (-1) ** int(sum(own)) * whole
             most = np.maximum(most, np.abs(whole))
-        kept: Bools = ~(np.abs(mixed) <= CANCELLED * most) | (near.sum(axis=0) > MOST_NEAR)
+        kept: Bools = there & (~(np.abs(mixed) <= CANCELLED * most) | (near.sum(axis=0) > MOST_NEAR))
         return kept
 
 
