@@ -172,6 +172,16 @@ def test_behind_a_call() -> None:
         assert answer.evals == plain.evals
 
 
+def test_behind_calls_of_calls() -> None:
+    """However many there are, each with something of its own to do: a disc as one integral over two variables."""
+    calls = "".join(f"def g{k}(x, t) -2*g{k - 1}(x, t)/2\n" for k in range(1, 41))
+    inner = "integral [-1, 1] [x^2 + y^2 < t] d(y)"
+    behind = potto.compile(f"def g0(x, t) {inner}\n{calls}def f(t) integral [-1, 1] g40(x, t) d(x)").f(0.5)
+    written = potto.compile(f"def f(t) integral [-1, 1] ({inner}) d(x)").f(0.5)
+    assert abs(behind.value - math.pi / 2) <= behind.error <= 1e-13
+    assert behind.evals == written.evals
+
+
 def test_a_function_with_variables_called_like_ours() -> None:
     before = "def inner(y, x) integral [0, y] x*u d(u)\ndef other(u) integral [0, 1] inner(u, x) d(x)"
     # other(u) = u^2/4; over [0, t]: t^3/12

@@ -11,10 +11,11 @@ from __future__ import annotations
 
 from potto.calculus.decomposition.guards import is_guard
 from potto.calculus.inlining.currying import arguments_of, sizes_of, uncurry
-from potto.calculus.inlining.expand import Resolve
+from potto.calculus.inlining.expand import Resolve, Step, driven, named
 from potto.calculus.surfaces.trace import spine
 from potto.core.binders import apart
 from potto.core.terms import (
+    ZERO,
     App,
     Branch,
     Deriv,
@@ -32,15 +33,15 @@ from potto.core.terms import (
     substitute,
 )
 
-MOST_CALLS = 20  # calls behind calls that are looked into
+NONE = ZERO  # what is no integral that could be joined
 
 
 def joined(term: Integral, resolve: Resolve) -> Integral:
     """An equal integral, or the same one where nothing can be joined. `resolve` gives the terms of definitions."""
     changed = False
     while True:
-        inner = _inner(term.body, frozenset(term.variables), resolve, MOST_CALLS)
-        if inner is None:
+        inner = driven(_inner(term.body, frozenset(term.variables), resolve, frozenset()))
+        if not isinstance(inner, Integral):
             return apart(term) if changed else term  # type: ignore[return-value]
         term, changed = _one(term, inner), True
 
@@ -52,46 +53,54 @@ def _one(outer: Integral, inner: Integral) -> Integral:
     )
 
 
-def _inner(body: Term, around: frozenset[str], resolve: Resolve, calls: int) -> Integral | None:
-    """The body as an integral that varies with the variables around it, and whose bounds do not jump with them."""
+def _inner(body: Term, around: frozenset[str], resolve: Resolve, within: frozenset[Term]) -> Step:
+    """The body as an integral that varies with the variables around it, and whose bounds do not jump with them; else
+    NONE. within: the definitions that are being looked into, none of which is within itself."""
     match body:
         case Integral():
             jumps = any(isinstance(n, Branch | App) for pair in body.bounds for b in pair for n in postorder(b))
-            return body if body.free & around and not jumps else None
+            return body if body.free & around and not jumps else NONE
         case Prim(op="neg", args=(arg,)):
-            inner = _inner(arg, around, resolve, calls)
-            return None if inner is None else _over(inner, apply("neg", inner.body))
+            return _with((yield _inner(arg, around, resolve, within)), body, 0)
         case Prim(op="div", args=(above, below)) if not _heavy(below):
-            inner = _inner(above, around, resolve, calls)
-            return None if inner is None else _with(inner, body, 0)
+            return _with((yield _inner(above, around, resolve, within)), body, 0)
         case Prim(op="mul"):
-            return _among_factors(body, around, resolve, calls)
+            return (yield _among_factors(body, around, resolve, within))
         case If() if is_guard(body) and body.condition.free.isdisjoint(around):
-            inner = _inner(body.then, around, resolve, calls)
-            if inner is None:
-                return None
+            inner = yield _inner(body.then, around, resolve, within)
+            if not isinstance(inner, Integral):
+                return NONE
             inner = bound_apart(inner, body.condition.free)
             return _over(inner, if_(body.condition, inner.body, body.orelse))
         case App():
-            made = _called(body, resolve) if calls else None
-            return None if made is None else _inner(made, around, resolve, calls - 1)
+            head, _ = spine(body)
+            made = None if head in within else _called(body, resolve)
+            if made is None:
+                return NONE
+            return (yield _inner(made, around, resolve, within | {head} if isinstance(head, Global) else within))
         case _:
-            return None
+            return NONE
 
 
-def _among_factors(body: Prim, around: frozenset[str], resolve: Resolve, calls: int) -> Integral | None:
+def _among_factors(body: Prim, around: frozenset[str], resolve: Resolve, within: frozenset[Term]) -> Step:
     """Of a product the only factor that is an integral, with the others inside of it."""
     heavy = [at for at, factor in enumerate(body.args) if _heavy(factor) or isinstance(factor, App)]
-    found = [(at, inner) for at in heavy if (inner := _inner(body.args[at], around, resolve, calls)) is not None]
+    found = list[tuple[int, Term]]()
+    for at in heavy:
+        inner = yield _inner(body.args[at], around, resolve, within)
+        if isinstance(inner, Integral):
+            found.append((at, inner))
     others = [at for at in heavy if all(at != place for place, _ in found)]
     if len(found) != 1 or any(_heavy(body.args[at]) for at in others):
-        return None
+        return NONE
     at, inner = found[0]
     return _with(inner, body, at)
 
 
-def _with(inner: Integral, body: Prim, at: int) -> Integral:
+def _with(inner: Term, body: Prim, at: int) -> Term:
     """The integral with what the body does to it done to its integrand."""
+    if not isinstance(inner, Integral):
+        return NONE
     inner = bound_apart(inner, body.free)
     args = list(body.args)
     args[at] = inner.body
@@ -109,13 +118,8 @@ def _over(term: Integral, body: Term) -> Integral:
 def _called(call: App, resolve: Resolve) -> Term | None:
     """What a call of a definition gives, if that may be an integral."""
     head, groups = spine(call)
-    for _ in range(MOST_CALLS):
-        if not isinstance(head, Global):
-            break
-        found = resolve(head)
-        if found is None:
-            return None
-        head = found
+    if isinstance(head, Global):
+        head = named(head, resolve) or head
     if not isinstance(head, Lam):
         return None
     params, body = uncurry(head, sizes_of(groups))
