@@ -31,23 +31,20 @@ PROGRAMS = {
 }
 
 
-@pytest.mark.parametrize("program", list(PROGRAMS))
-def test_cells_are_the_same(program: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    random = np.random.default_rng(1)
-    count = 1000 if program == "three variables" else 5003  # no multiple of eight
-    given = random.integers(-4, 7, (3, count)) / 4 + random.choice([0.0, 0.0, 1e-15, 1e-3], (3, count))
-    asked: list[tuple[StraightIntegral, Found, Found]] = []
-    by_machine_code = LoweredTopologies.run
+Asked = tuple[LoweredTopologies, Found, Found]
+
+
+@pytest.fixture
+def asked(monkeypatch: pytest.MonkeyPatch) -> list[Asked]:
+    """What is found from now on, by numpy and by machine code."""
+    found, machines = list[Asked](), []
+    run, function = LoweredTopologies.run, LoweredTopologies.function
 
     def both(way: LoweredTopologies, function, env, batch):
-        plan, names = way.plan, way.plan.names
-        here = {name: module._spread(env[name], batch, False) for name in names}
-        found = by_machine_code(way, function, env, batch)
-        asked.append((plan, module._found(plan, machines[-1], here, batch), found))
-        return found
-
-    machines = []
-    function = LoweredTopologies.function
+        here = {name: module._spread(env[name], batch, way.merging) for name in way.plan.names}
+        own = run(way, function, env, batch)
+        found.append((way, module._found(way.plan, machines[-1], here, batch, way.merging), own))
+        return own
 
     def noted(way: LoweredTopologies, machine):
         machines.append(machine)
@@ -55,16 +52,40 @@ def test_cells_are_the_same(program: str, monkeypatch: pytest.MonkeyPatch) -> No
 
     monkeypatch.setattr(LoweredTopologies, "run", both)
     monkeypatch.setattr(LoweredTopologies, "function", noted)
+    return found
+
+
+@pytest.mark.parametrize("program", list(PROGRAMS))
+def test_cells_are_the_same(program: str, asked: list[Asked]) -> None:
+    random = np.random.default_rng(1)
+    count = 1000 if program == "three variables" else 5003  # no multiple of eight
+    given = random.integers(-4, 7, (3, count)) / 4 + random.choice([0.0, 0.0, 1e-15, 1e-3], (3, count))
     f = potto.compile(PROGRAMS[program]).f
     with potto.settings(backend="native"):
         f(*given)
     assert asked
-    for plan, by_numpy, found in asked:
-        assert (by_numpy.plain == found.plain).all()
-        assert _lit(plan, by_numpy) == _lit(plan, found)
-        assert len(found.members) == len(_lit(plan, found))  # of these few surfaces all sides are known
+    _same(asked)
     assert any(len(found.members) for *_, found in asked)
     assert not all(found.plain.all() for *_, found in asked) or program == "one variable"
+
+
+def test_cuts_that_are_one_count_once(asked: list[Asked]) -> None:
+    """Left and right of its centre a disc turns on a border of pixels, where its sections leave them."""
+    text = "def f(a, b, r) integral ([a, a + 1/16], [b, b + 1/16]) [(x - 0.5)^2 + (y - 0.5)^2 < r] d(x, y)"
+    a, b = (z.ravel() for z in np.meshgrid(np.arange(16) / 16, np.arange(16) / 16))
+    with potto.settings(backend="native"):
+        potto.grad(potto.compile(text).f, ("r", "b"))(a, b, 0.1)
+    _same(asked)
+    (before, all_of_them), (merged, those) = ((way, found) for way, _, found in asked)
+    assert (before.merging, merged.merging) == (False, True)
+    assert those.plain.size == 4 == (~all_of_them.plain).sum() and those.plain.all()
+
+
+def _same(asked: list[Asked]) -> None:
+    for way, by_numpy, found in asked:
+        assert (by_numpy.plain == found.plain).all()
+        assert _lit(way.plan, by_numpy) == _lit(way.plan, found)
+        assert len(found.members) == len(_lit(way.plan, found))  # of these few surfaces all sides are known
 
 
 def _lit(plan: StraightIntegral, found: Found) -> list[tuple[int, ...]]:

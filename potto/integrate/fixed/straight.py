@@ -96,6 +96,18 @@ class StraightIntegral(Struct, frozen=True, dict=True, eq=False):
             found = self.faces[sides] = on_sides(self.body, side)
         return found
 
+    def going_on(self, i: int) -> list[int]:
+        """The rows of variable i's frame at which nothing jumps, those first that turn.
+
+        One may be another one of them once more, as is the fold of a disc whose sections leave a pixel just there.
+        Between the two is nothing, to first order, and as what is further in goes on across them, less than rounding;
+        where it jumps, however little lies between counts. The one that turns is the cut, as ends of stretches by it
+        are like square roots.
+        """
+        jumping = {row for _, rows in self.jumps[i] for row in rows}
+        rows = [row for row in range(2, len(self.items[i])) if row not in jumping]
+        return sorted(rows, key=lambda row: row not in self.turning[i])
+
     def decided(self, sides: tuple[bool, ...]) -> StraightIntegral:
         """The plan with the formulas that cuts have where choices fall like this."""
         assert self.choices is not None

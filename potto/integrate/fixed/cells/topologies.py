@@ -68,21 +68,25 @@ def topologies(
         found = _by_either(plan, tracking, env, here, batch)
     left = np.flatnonzero(~found.plain)
     if not moving and 0 < left.size <= FEW:
-        there = {name: _spread(value, left.size, True) for name, value in gather(env, left).items() if name in here}
-        found = found.with_others(_found(plan, machine.tracking(), there, left.size, True), left)
+        here = gather({name: env[name] for name in plan.names}, left)
+        there = {name: _spread(value, left.size, True) for name, value in here.items()}
+        found = found.with_others(_by_either(plan, machine.tracking(), here, there, left.size, True), left)
     return found.plain, _gathered(plan, machine, found)
 
 
 def _by_either(
-    plan: StraightIntegral, machine: Evaluator, env: dict[str, Value], here: dict[str, Value], batch: int
-) -> Found:
+    plan: StraightIntegral, machine: Evaluator, env: dict[str, Value], here: dict[str, Value], batch: int,
+    merging: bool = False,
+) -> Found:  # fmt: skip
     """By machine code, if that is to be used now, or by numpy."""
-    way = lowered_topologies(plan, {name: Cell(cell.v, cell.e) for name, cell in env.items() if isinstance(cell, Cell)})
+    cells = {name: cell for name, cell in env.items() if isinstance(cell, Cell)}
+    parts = cells if merging else {name: Cell(cell.v, cell.e) for name, cell in cells.items()}
+    way = lowered_topologies(plan, parts, merging)
     function = way.function(machine)
     if function is not None:
         return way.run(function, env, batch)
     with way.promotion.by_numpy():
-        return _found(plan, machine, here, batch)
+        return _found(plan, machine, here, batch, merging)
 
 
 def _found(
@@ -202,20 +206,15 @@ def _rows(values: tuple[Cell, ...], count: int) -> tuple[Array, Array]:
 
 
 def _again(plan: StraightIntegral, i: int, values: tuple[Cell, ...], places: Array) -> Bools:
-    """Which rows (R, M) are another cut once more: in the same place, to the last bit, with the same speeds, as is the
-    fold of a disc whose sections leave a pixel just there. Between them is nothing, to first order, and as what is
-    further in goes on across them, less than rounding; where it jumps, however little lies between counts. One that
-    turns is the cut, as ends of stretches by it are like square roots."""
+    """Which rows (R, M) are another cut once more (`StraightIntegral.going_on`): in the same place, to the last bit,
+    with the same speeds."""
     speeds = [[0.0 if t is None else t for t in cell.t] for cell in values]
     numbers = np.array([[place, *(np.broadcast_to(t, place.shape) for t in own)]
                         for place, own in zip(places, speeds, strict=True)])  # fmt: skip
     same = (numbers[:, None] == numbers).all(axis=2)
-    jumping = {row for _, rows in plan.jumps[i] for row in rows}
-    going_on = [row for row in range(2, len(places)) if row not in jumping]
-    first = sorted(going_on, key=lambda row: row not in plan.turning[i])
-    again = np.zeros(places.shape, dtype=bool)
-    for n, row in enumerate(first):
-        again[row] = same[row, first[:n]].any(axis=0)
+    rows, again = plan.going_on(i), np.zeros(places.shape, dtype=bool)
+    for n, row in enumerate(rows):
+        again[row] = same[row, rows[:n]].any(axis=0)
     return again
 
 

@@ -52,15 +52,20 @@ class Found(Struct, frozen=True):
 
 
 class LoweredTopologies(Struct, frozen=True, dict=True, eq=False):
-    """The function for parameters with these parts."""
+    """The function for parameters with these parts. merging: cuts of the outermost variable that are one and move as
+    one count once."""
 
     plan: StraightIntegral
     places: tuple[ParameterPlace, ...]
+    merging: bool = False
     promotion: Promotion = field(default_factory=lambda: Promotion(NAME))
 
     def function(self, machine: Evaluator) -> Loaded | None:
-        """The function, if it is to be used now. machine: one that keeps track of rounding, without directions."""
-        return self.promotion.function(machine.backend, lambda: TopologyText(self.plan, machine).text(self.places))
+        """The function, if it is to be used now. machine: one that keeps track of rounding, with directions only where
+        cuts are merged."""
+        return self.promotion.function(
+            machine.backend, lambda: TopologyText(self.plan, machine, self.merging).text(self.places)
+        )
 
     @cached_property
     def most(self) -> int:
@@ -94,10 +99,10 @@ class LoweredTopologies(Struct, frozen=True, dict=True, eq=False):
         return Found(fine, between, members, sides)
 
 
-def lowered_topologies(plan: StraightIntegral, env: Mapping[str, Value]) -> LoweredTopologies:
+def lowered_topologies(plan: StraightIntegral, env: Mapping[str, Value], merging: bool = False) -> LoweredTopologies:
     """The function for an environment whose numbers have these parts."""
-    places = places_of(plan.names, env)
-    found: LoweredTopologies | None = plan.lowered.get(places)
+    key = places_of(plan.names, env), merging
+    found: LoweredTopologies | None = plan.lowered.get(key)
     if found is None:
-        found = plan.lowered[places] = LoweredTopologies(plan, places)
+        found = plan.lowered[key] = LoweredTopologies(plan, *key)
     return found

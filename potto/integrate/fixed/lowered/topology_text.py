@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
+from functools import reduce
 
 import numpy as np
 from msgspec import Struct
@@ -56,8 +57,9 @@ class TopologyText(FormulaText):
     """Writes the function. Of the cells of eight members those are put down, one after the other, in which something is
     to be integrated, as far as it is told by which sides that is."""
 
-    def __init__(self, plan: StraightIntegral, machine: Evaluator) -> None:
+    def __init__(self, plan: StraightIntegral, machine: Evaluator, merging: bool = False) -> None:
         super().__init__(machine)
+        self.resting, self.merging = machine.with_directions(0).tracking(), merging
         self.plan, self.lit = plan, lit_sides(plan)
         if len(children(plan.surfaces.body)) > MOST_SIDES:
             raise NotStraight("more surfaces than a number has bits")
@@ -81,18 +83,23 @@ class TopologyText(FormulaText):
         if i == len(self.plan.variables):
             self.tell(env, there, between)
             return
-        cells = self.evaluated(self.plan.frames[i], env, self.machine)
-        ordered = self.ordered(self.placed(cells), list(map(self.near, cells)))
+        merging = self.merging and not i
+        cells = self.evaluated(self.plan.frames[i], env, self.machine if merging else self.resting)
+        places = self.placed(cells)
+        if merging:
+            places = self.merged(cells, places)
+            env = {name: Symbol(symbol.v, symbol.e, (), ()) for name, symbol in env.items()}
+        ordered = self.ordered(places, list(map(self.near, cells)))
         self.only(there, ordered.fine)
-        rows, places = at.room(len(cells)), at.room(len(cells))
+        rows, ends = at.room(len(cells)), at.room(len(cells))
         for rank, (row, place, _) in enumerate(ordered.rows):
             at.store(row, at.at(rows, rank))
-            at.store(place, at.at(places, rank))
+            at.store(place, at.at(ends, rank))
         j = at.begin(str(len(cells) - 1))
         after = at.whole("add", j, 1)
         own = at.apply("and", at.apply("and", there, ordered.fine), at.apply("gt", ordered.counted, self.spread(after)))
         at.begin("1", at.any(own))
-        low, high = (at.load(at.at(places, which)) for which in (j, after))
+        low, high = (at.load(at.at(ends, which)) for which in (j, after))
         for which in (j, after):
             shifted = at.apply("mul", between, at.number(float(1 << ROW_BITS)))
             between = at.apply("add", shifted, at.load(at.at(rows, which)))
@@ -115,6 +122,20 @@ class TopologyText(FormulaText):
                 place = at.apply("select", nowhere, at.number(np.nan), place)
             places.append(place)
         return places
+
+    def merged(self, cells: Sequence[Symbol], places: Sequence[str]) -> list[str]:
+        """The same for the outermost variable, where a cut that is another one once more is nowhere."""
+        at, found = self.at, list(places)
+        nothing = (None,) * (self.k1 - 1)
+        moving = [[place, *(self.plain(x) or self.zero for x in cell.t or nothing)]
+                  for place, cell in zip(places, cells, strict=True)]  # fmt: skip
+        rows = self.plan.going_on(0)
+        for n, row in enumerate(rows):
+            for other in rows[:n]:
+                same = (at.apply("eq", x, y) for x, y in zip(moving[row], moving[other], strict=True))
+                again = reduce(lambda a, b: at.apply("and", a, b), same)
+                found[row] = at.apply("select", again, at.number(np.nan), found[row])
+        return found
 
     def near(self, cell: Symbol) -> str:
         """From where on a place is as good as another: where roots merge just here that is not known."""
@@ -192,7 +213,7 @@ class TopologyText(FormulaText):
 
     def surfaces(self, env: Env) -> list[Symbol]:
         surfaces = self.plan.surfaces
-        return self.evaluated(surfaces, env, self.machine) if children(surfaces.body) else []
+        return self.evaluated(surfaces, env, self.resting) if children(surfaces.body) else []
 
     def only(self, there: str, mask: str) -> None:
         """Members of `there` for whom the mask does not hold are not plain."""
