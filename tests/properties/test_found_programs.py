@@ -273,3 +273,30 @@ def test_sides_that_few_evaluations_leave_unknown_do_not_replace_what_is_known()
     weight = math.sqrt(math.pi) / 2 * (1 + math.erf(2))
     assert abs(answer.value - 2.5 * weight) <= answer.error
     assert abs(answer.tangent + weight / 3) <= answer.tangent_error <= 1e-9
+
+
+@pytest.mark.parametrize(
+    ("summands", "below", "second"),
+    [
+        # Roots t and sqrt(t): no one formula, so that nan was part of the second derivative.
+        ("sum i in 1..2 ([x^i < t])", T + math.sqrt(T), -(T**-1.5) / 4),
+        # A summand whose surface is an element that does not vary: a delta outside of integrals.
+        ("sum i in 0..1 ([[x^2, t][i] < t])", math.sqrt(T), -(T**-1.5) / 4),
+        # The same with a plain conditional for an array: at the root of the one the other seemed to jump as well.
+        ("sum i in 0..1 ([(if i < 1 then x^2 else t) < t])", math.sqrt(T), -(T**-1.5) / 4),
+    ],
+)
+def test_summands_whose_index_tells_the_kind_of_their_surface(summands: str, below: float, second: float) -> None:
+    f = potto.compile(f"def f(t) integral [0, 1] {summands} d(x)").f
+    assert abs(f(T).value - below) <= f(T).error + 1e-15
+    answer = potto.hessian(f)(T)
+    assert answer.converged and abs(answer.value - second) <= answer.error + 1e-15 < 1e-12
+
+
+def test_a_tail_whose_first_nodes_have_no_number() -> None:
+    """The derivatives of 1/exp are 0/0 far out. What was added up stayed nan when that piece had been replaced, and all
+    others were halved until the budget was spent. Of a logistic curve around the mean it is 1/2 for every t."""
+    f = potto.compile("def f(t) integral (x ~ normal(t, 0.7)) 1/(1 + 1/exp(3*(x - t))) d(x)").f
+    answer = potto.hessian(f)(0.923)
+    assert answer.converged and abs(answer.value) <= answer.error < 1e-12
+    assert answer.evals < 100_000

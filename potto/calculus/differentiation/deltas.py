@@ -16,6 +16,7 @@ from potto.calculus.differentiation.boundary_terms import remaining
 from potto.calculus.differentiation.derivative import partial, total, vanishes, zero_like
 from potto.calculus.solving.pivots import NoClosedForm, Roots, SurfaceRoot, chosen, pivots
 from potto.calculus.surfaces.branch_assignment import branches_of, flipping, forced, unguarded
+from potto.calculus.surfaces.case_split import by_choices
 from potto.core.printer import format_term
 from potto.core.simplify import normalized_surface
 from potto.core.terms import (
@@ -23,14 +24,12 @@ from potto.core.terms import (
     ZERO,
     Branch,
     Delta,
-    If,
     Integral,
     Sum,
     Term,
     Tuple,
     children,
     delta,
-    if_,
     neg,
     postorder,
     prim,
@@ -54,7 +53,7 @@ def without_deltas(node: Integral, wanted: Roots = Roots.STEADY) -> Term:
     PottoError (P0505). wanted: at which roots."""
     if not any(isinstance(n, Delta) for n in postorder(node.body)):
         return node
-    body = transform(_inner_first(node.body, wanted), lambda _, new: _chosen(new) if isinstance(new, Delta) else new)
+    body = by_choices(_inner_first(node.body, wanted))
     if body is not node.body:
         node = with_integrand(node, body)
     parts: list[Term] = []
@@ -79,24 +78,6 @@ def without_leftovers(term: Term) -> Term:
         return () if isinstance(node, Integral) and level_sets.level_set(node) is not None else children(node)
 
     return transform(term, lambda _, new: ZERO if isinstance(new, Delta) else new, below)
-
-
-def _chosen(what: Delta) -> Term:
-    """A delta whose place a plain condition chooses, as a choice between deltas: each has its roots."""
-    choice = next((node for node in postorder(*what.coordinates) if isinstance(node, If)), None)
-    if choice is None:
-        return what
-
-    def side(then: bool) -> Term:
-        def taken(_: Term, new: Term) -> Term:
-            here = isinstance(new, If) and new.condition is choice.condition
-            return (new.then if then else new.orelse) if here and isinstance(new, If) else new
-
-        found = transform(what, taken)
-        assert isinstance(found, Delta)
-        return _chosen(found)
-
-    return if_(choice.condition, side(True), side(False))
 
 
 def _inner_first(body: Term, wanted: Roots) -> Term:

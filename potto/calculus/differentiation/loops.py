@@ -18,6 +18,7 @@ from potto.core.terms import (
     Integral,
     Lam,
     ListOf,
+    Prim,
     Proj,
     Sum,
     Term,
@@ -110,8 +111,8 @@ def dual_fold(node: Fold, tangent: str, start: Term, slope: Term) -> Term:
 
 
 def stepped(root: Term) -> Term:
-    """A term with the folds written out whose state decides a condition, and the sums of conditions that decide one, as
-    far as their bounds are known."""
+    """A term with the folds written out whose state decides a condition, the sums of conditions that decide one, and
+    those whose index tells what kind of surface a summand has, as far as their bounds are known."""
     nodes = postorder(root)
     sums = {
         part
@@ -120,6 +121,7 @@ def stepped(root: Term) -> Term:
         for part in postorder(node.surface)
         if isinstance(part, Sum) and decided_by((part.variable,), part.body)
     }
+    sums.update(node for node in nodes if isinstance(node, Sum) and _of_several_kinds(node))
     if not sums and not any(isinstance(node, Fold) for node in nodes):
         return root
     return transform(root, lambda old, new: _written_out(new, old in sums) if isinstance(new, Fold | Sum) else new)
@@ -143,6 +145,22 @@ def _written_out(node: Fold | Sum, decides: bool) -> Term:
 def decided_by(names: Sequence[str], body: Term) -> bool:
     """Whether a branch in a term is on a surface that varies with some names."""
     return any(isinstance(part, Branch) and not part.surface.free.isdisjoint(names) for part in postorder(body))
+
+
+def _of_several_kinds(node: Sum) -> bool:
+    """Whether surfaces of the summands differ by more than numbers: in an exponent, in the element of an array, or in
+    the side of a plain conditional. There is no one way to solve them."""
+    own = frozenset((node.variable,))
+
+    def tells(part: Term) -> bool:
+        match part:
+            case Prim(op="pow", args=(_, chosen)) | Index(index=chosen) | If(condition=chosen):
+                return not chosen.free.isdisjoint(own)
+            case _:
+                return False
+
+    branches = (part for part in postorder(node.body) if isinstance(part, Branch) and part.surface.free & own)
+    return any(tells(inner) for part in branches for inner in postorder(part.surface))
 
 
 def of_integrals(node: Integral) -> Term:

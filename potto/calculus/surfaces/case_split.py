@@ -1,9 +1,10 @@
 """Conditions on abs, min, max and clamp as conditions on what is inside of them.
 
-Owns `cased`, `by_extremes`, `unnested` and `resolved`. The surface of `[max(x, y) < t]` runs along x and along y, so
-that no variable of integration cuts all of it; those of `[x < t]*[y < t]` do, which is the same. Where a condition does
-not rise or fall with what is the greatest or the least, a condition that has no jump of its own chooses between cases.
-Conditions that cancel go with it, as those of cases do: [max(x, 2*x) - 2*x < t] where 2*x is the greater.
+Owns `cased`, `by_extremes`, `unnested`, `by_choices` and `resolved`. The surface of `[max(x, y) < t]` runs along x and
+along y, so that no variable of integration cuts all of it; those of `[x < t]*[y < t]` do, which is the same. Where a
+condition does not rise or fall with what is the greatest or the least, a condition that has no jump of its own chooses
+between cases. Conditions that cancel go with it, as those of cases do: [max(x, 2*x) - 2*x < t] where 2*x is the
+greater.
 """
 
 from __future__ import annotations
@@ -17,12 +18,16 @@ from potto.calculus.surfaces.comparisons import by_brackets, by_signs, of_argume
 from potto.calculus.surfaces.nested_brackets import has_nested
 from potto.core.terms import (
     Branch,
+    Delta,
+    If,
     Integral,
     Prim,
     Term,
     bound_names,
     branch,
     children,
+    delta,
+    if_,
     mul,
     neg,
     postorder,
@@ -68,7 +73,33 @@ def resolved(term: Term) -> Term:
 
     [x*y > 0] is [y > 0] where x > 0, and [y < 0] where it is not: a formula for its roots in y says nothing of x = 0.
     """
-    return transform(term, lambda _, new: _by_factors(cased(unnested(new))) if isinstance(new, Integral) else new)
+    return transform(
+        by_choices(term), lambda _, new: _by_factors(cased(unnested(new))) if isinstance(new, Integral) else new
+    )
+
+
+def by_choices(term: Term) -> Term:
+    """A term with its conditions, and its deltas, whose place a plain conditional chooses as choices between such: each
+    has roots of its own, and where two conditions meet depends on which of them there are."""
+    return transform(term, lambda _, new: _chosen(new) if isinstance(new, Branch | Delta) else new)
+
+
+def _chosen(node: Branch | Delta) -> Term:
+    choice = next((part for c in node.coordinates for part in _outside(c) if isinstance(part, If)), None)
+    if choice is None:
+        return node
+
+    def side(then: bool) -> Term:
+        same = (part for c in node.coordinates for part in postorder(c) if isinstance(part, If))
+        taken: dict[Term, Term] = {
+            part: part.then if then else part.orelse for part in same if part.condition is choice.condition
+        }
+        coordinates = tuple(replaced(c, taken) for c in node.coordinates)
+        if isinstance(node, Delta):
+            return by_choices(delta(coordinates))
+        return by_choices(branch(coordinates, node.strict, node.then, node.orelse))
+
+    return if_(choice.condition, side(True), side(False))
 
 
 def unnested(term: Integral) -> Integral:

@@ -62,10 +62,12 @@ class Tally:
         self.add(work, p, 1)
 
     def add(self, work: PanelBatch, p: Pieces, sign: int) -> None:
-        """Count pieces, or (-1) take them out again."""
-        owner, x = work.seg.owner[p.segment], p.size if work.number else p.integral
+        """Count pieces, or (-1) take them out again. What is not a number is not counted: no sum would be rid of it,
+        when smaller pieces with values have taken its place."""
+        owner = work.seg.owner[p.segment]
+        x, size = (np.where(np.isfinite(a), a, 0.0) for a in (p.size if work.number else p.integral, p.size))
         self.count += sign * np.bincount(owner, minlength=work.batch)
-        self.gross += np.bincount(owner, sign * p.size.max(axis=0), minlength=work.batch)
+        self.gross += np.bincount(owner, sign * size.max(axis=0), minlength=work.batch)
         rows = x.reshape(work.width, -1, owner.size)[:, : 1 + work.k].reshape(-1, owner.size)
         for total, row in zip(self.total, rows, strict=True):
             total += np.bincount(owner, sign * row, minlength=work.batch)
