@@ -206,3 +206,21 @@ def test_the_second_derivative_of_what_two_balls_share(order: str) -> None:
     f = potto.compile(f"def f(d)\n    integral ([-2, 2], [-2, 2], [-2, 2]) {balls} d({order})").f
     answer = potto.hessian(f)(1.2)
     assert abs(answer.value - 0.6 * math.pi) <= answer.error + 1e-14 <= 1e-10
+
+
+@pytest.mark.parametrize(("t", "b"), [(0.9, 0.1), (0.9, 0.3)])
+def test_a_level_set_across_a_kink_of_what_is_summed(t: float, b: float) -> None:
+    """Where x = 2y - b crosses the curve the sum over its roots bends: that was cut nowhere, and 1e-7 missed with a bar
+    of 3e-14. From there on x - 2y + b is positive, and each x has one root."""
+
+    def above(x: mpmath.mpf) -> mpmath.mpf:
+        return mpmath.findroot(lambda y: y + y**5 + x + x**5 - t, 0.4)
+
+    end = mpmath.findroot(lambda x: x + x**5 - t, 0.7)
+    bend = mpmath.findroot(lambda x: x - 2 * above(x) + b, (0.2, 0.8), solver="anderson")
+    exact = mpmath.quad(lambda x: (x - 2 * above(x) + b) / (1 + 5 * above(x) ** 4), [bend, end])
+    peak = "delta(x + x^5 + y + y^5 - t)"
+    f = potto.compile(f"def f(t, b) integral ([0, 1], [0, 1]) {peak}*max(x - 2*y + b, 0) d(x, y)").f
+    answer = f(t, b)
+    assert abs(answer.value - exact) <= answer.error + 1e-15  # mpmath's own, of about 15 digits
+    assert answer.error < 1e-12 and answer.evals < 300

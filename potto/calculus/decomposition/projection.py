@@ -96,15 +96,15 @@ def shadows_of_cuts(
 
 
 def shadows_of_roots(own: Cut, cuts: tuple[Cut, ...], here: Here, alone: bool) -> Iterator[Shadow | Critical]:
-    """What a sum over the roots of one surface leaves: it jumps where they meet a bound, or a jump of what is summed.
+    """What a sum over the roots of one surface leaves: it jumps where they meet a bound, or a jump of what is summed,
+    and bends where they meet a bend of that.
 
     alone: no other variable has a share, so that the sum is infinite where roots merge.
     """
     yield from _at_bounds(own, here.within, True)
     yield from _turning(own, here, alone)
-    for cut in cuts:
-        if cut.decides:
-            yield from _crossings(own, cut, here, True)
+    for cut in crossing(cuts, here.variable, here.further, here.names)[0]:
+        yield from _crossings(own, cut, here, cut.decides)
 
 
 def _at_bounds(cut: Cut, within: Within, steps: bool) -> Iterator[Shadow]:
