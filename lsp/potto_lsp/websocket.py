@@ -17,7 +17,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync import server
 from websockets.typing import Origin
 
-from potto_lsp.wire import MOST_BYTES, Outbox
+from potto_lsp.wire import MOST_BYTES, Outbox, Part
 
 if TYPE_CHECKING:
     from websockets.sync.server import ServerConnection
@@ -72,9 +72,9 @@ class _Frames:
     def fileno(self) -> int:
         raise OSError("frames are not written past the connection")
 
-    def write(self, message: bytes, /) -> None:
+    def write(self, message: Part, /) -> None:
         try:
-            self._connection.send(message.partition(b"\r\n\r\n")[2].decode())
+            self._connection.send(bytes(message).partition(b"\r\n\r\n")[2].decode())
         except ConnectionClosed as error:
             raise ConnectionError(str(error)) from error
 

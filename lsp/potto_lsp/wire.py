@@ -19,6 +19,7 @@ from typing import Any, BinaryIO, Protocol
 
 logger = logging.getLogger(__name__)
 MOST_BYTES = 256_000_000  # of one message; a header that says more is broken
+Part = bytes | memoryview  # of a message
 _OF_A_BROWSER = re.compile(rb"[A-Z]+ \S+ HTTP/")
 
 
@@ -129,7 +130,7 @@ class MessageStream(Protocol):
 
     def fileno(self) -> int: ...
 
-    def write(self, message: bytes, /) -> object: ...
+    def write(self, message: Part, /) -> object: ...
 
     def flush(self) -> None: ...
 
@@ -143,7 +144,7 @@ class Outbox:
 
     def __init__(self, stream: MessageStream) -> None:
         self._stream, self._pipe = stream, _pipe_of(stream)
-        self._queue: SimpleQueue[bytes | None] = SimpleQueue()
+        self._queue: SimpleQueue[Part | None] = SimpleQueue()
         self._lock = Lock()
         self._left = 0  # messages that the thread has not written yet: those that come after must wait for it
         self._thread = Thread(target=self._write, name="potto-outbox", daemon=True)
@@ -155,7 +156,7 @@ class Outbox:
 
     def write(self, data: bytes) -> None:
         """Queue a framed message."""
-        left = data
+        left: Part = data
         with self._lock:
             if not self._left and self._pipe is not None:
                 left = self._pipe.write(left)
@@ -190,15 +191,16 @@ class _Pipe:
         self._descriptor, self._poll = descriptor, select.poll()
         self._poll.register(descriptor, select.POLLOUT)
 
-    def write(self, data: bytes) -> bytes:
-        """Write as much as possible without waiting. Returns what is left."""
+    def write(self, data: Part) -> Part:
+        """Write as much as possible without waiting. Returns what is left: not a copy, which would take longer than to
+        write it, an answer about a long file being megabytes."""
         rest = memoryview(data)
         try:
             while rest and self._poll.poll(0) == [(self._descriptor, select.POLLOUT)]:
                 rest = rest[os.write(self._descriptor, rest[: select.PIPE_BUF]) :]  # so much never waits
         except OSError:
             pass  # whoever writes the rest meets it again, and says so
-        return bytes(rest)
+        return rest
 
 
 def _pipe_of(stream: MessageStream) -> _Pipe | None:

@@ -7,7 +7,7 @@ do not.
 
 from __future__ import annotations
 
-from potto.core.kinds import Array, Fold, Integral, Lam, Sum, Term
+from potto.core.term_kinds import Array, Fold, Integral, Lam, Sum, Term
 from potto.core.walking import Holding, bound_names, children, fresh, rebuild, rename_bound, transform, unknown
 
 # Of a term the names that binders in it bind, and whether one of them is bound by a binder around it too.

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from typing import Any, TypeGuard
 
-from potto.core.kinds import ONE, ZERO, Const, Prim, Term, const, prim
+from potto.core.term_kinds import ONE, ZERO, Const, Prim, Term, const, prim
 
 LONGEST = 1000
 

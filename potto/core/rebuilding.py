@@ -8,7 +8,7 @@ from __future__ import annotations
 import copyreg
 from typing import Any
 
-from potto.core import kinds
+from potto.core import term_kinds
 from potto.core.consing import Base, own_fields
 
 
@@ -17,32 +17,32 @@ def rebuilt(cls: type, fields: tuple[Any, ...]) -> Any:
     return _MADE_BY[cls](*fields)
 
 
-def _prim_from(op: str, args: tuple[kinds.Term, ...]) -> kinds.Prim:
-    return kinds.prim(op, *args)
+def _prim_from(op: str, args: tuple[term_kinds.Term, ...]) -> term_kinds.Prim:
+    return term_kinds.prim(op, *args)
 
 
 _MADE_BY: dict[type, Any] = {
-    kinds.Const: kinds.const,
-    kinds.Var: kinds.var,
-    kinds.Prim: _prim_from,
-    kinds.If: kinds.if_,
-    kinds.Branch: kinds.branch,
-    kinds.Tuple: kinds.tuple_,
-    kinds.Proj: kinds.proj,
-    kinds.ListOf: kinds.list_of,
-    kinds.Array: kinds.array,
-    kinds.Index: kinds.index,
-    kinds.Length: kinds.length,
-    kinds.Data: kinds.data,
-    kinds.Lam: kinds.lam,
-    kinds.App: kinds.app,
-    kinds.Global: kinds.global_,
-    kinds.Integral: kinds.integral,
-    kinds.Delta: kinds.delta,
-    kinds.Sum: kinds.sum_,
-    kinds.Fold: kinds.fold,
-    kinds.Deriv: kinds.deriv,
-    kinds.Hole: kinds.hole,
+    term_kinds.Const: term_kinds.const,
+    term_kinds.Var: term_kinds.var,
+    term_kinds.Prim: _prim_from,
+    term_kinds.If: term_kinds.if_,
+    term_kinds.Branch: term_kinds.branch,
+    term_kinds.Tuple: term_kinds.tuple_,
+    term_kinds.Proj: term_kinds.proj,
+    term_kinds.ListOf: term_kinds.list_of,
+    term_kinds.Array: term_kinds.array,
+    term_kinds.Index: term_kinds.index,
+    term_kinds.Length: term_kinds.length,
+    term_kinds.Data: term_kinds.data,
+    term_kinds.Lam: term_kinds.lam,
+    term_kinds.App: term_kinds.app,
+    term_kinds.Global: term_kinds.global_,
+    term_kinds.Integral: term_kinds.integral,
+    term_kinds.Delta: term_kinds.delta,
+    term_kinds.Sum: term_kinds.sum_,
+    term_kinds.Fold: term_kinds.fold,
+    term_kinds.Deriv: term_kinds.deriv,
+    term_kinds.Hole: term_kinds.hole,
 }
 
 

@@ -10,7 +10,7 @@ from operator import attrgetter, is_
 from typing import Any, Generic, TypeVar
 
 from potto.core.folding import apply
-from potto.core.kinds import (
+from potto.core.term_kinds import (
     App,
     Array,
     Branch,

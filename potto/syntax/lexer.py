@@ -18,7 +18,7 @@ from potto.syntax import kinds
 from potto.syntax.contextual import BEHIND, ENDS_OPERAND, MAY_BE_WORDS, SIMPLE_OPERATORS, contextual, uses_parameters
 from potto.syntax.head import BlockTracker
 from potto.syntax.nesting import Nesting
-from potto.syntax.sums import mark_bodies
+from potto.syntax.sum_bodies import mark_bodies
 from potto.syntax.tokens import FIRST_NAME, KEYWORDS, MASTER, NUMBER_PREFIX, OPERATORS, Comment, Token, normalized
 from potto.syntax.unknown import (
     bad_number,

@@ -1,7 +1,7 @@
 """Answers about whole files, put together from pieces that are kept in the form in which they are sent.
 
-Owns `PieceItems`, `part_of`, `lined` and `whole`. After a key all parts but one are the same; those below it are moved
-if lines were added or removed.
+Owns `PieceItems`, `sent`, `part_of`, `lined` and `whole`. After a key all parts but one are the same; those below it
+are moved if lines were added or removed.
 """
 
 from __future__ import annotations
@@ -38,9 +38,14 @@ class PieceItems(Struct, eq=False):
         return self.text
 
 
+def sent(items: Iterable[Any]) -> bytes:
+    """Items whose lines are those of the document, without the brackets around them."""
+    return json.dumps(list(items), separators=(",", ":"))[1:-1].encode("ascii")
+
+
 def part_of(items: Iterable[Any]) -> PieceItems:
     """The part for the items of a piece, whose lines count from its first one."""
-    text = json.dumps(list(items), separators=(",", ":"))[1:-1].replace("%", "%%")
+    text = sent(items).decode("ascii").replace("%", "%%")
     lines = tuple([int(found[2]) for found in _LINES.finditer(text)])
     return PieceItems(_LINES.sub(r'"\1":%d', text), lines)
 
@@ -54,6 +59,6 @@ def lined(ask: Ask) -> Iterator[tuple[PieceAt, int]]:
 
 def whole(ask: Ask, part: Callable[[PieceAt], PieceItems], beside: Iterable[Any] = ()) -> Encoded:
     """The items of all pieces, after those that belong to none."""
-    found = [part_of(beside).placed(0)]
+    found = [sent(beside)]
     found += [part(at).placed(line) for at, line in lined(ask)]
     return Encoded(found)

@@ -11,7 +11,7 @@ from potto.query import Database, query
 from potto.source import Span
 from potto_lsp import convert, protocol
 from potto_lsp.asking import Ask
-from potto_lsp.features.by_piece import PieceItems, lined, part_of
+from potto_lsp.features.by_piece import PieceItems, lined, part_of, sent
 from potto_lsp.text import DocumentText, Encoding
 from potto_lsp.wire import Encoded
 
@@ -29,7 +29,7 @@ def inlay_hints(ask: Ask) -> Encoded:
             hints = piece_hints(ask.db, ask.file, at.text, at.hidden)
             near = [hint for hint in hints if span.start <= at.start + hint.offset <= span.end and hint.kind not in off]
             found.append(part_of(_hint(DocumentText(at.text, text.encoding), hint) for hint in near).placed(line))
-    found.append(part_of(_live(ask, span)).placed(0))
+    found.append(sent(_live(ask, span)))
     return Encoded(found)
 
 

@@ -18,7 +18,6 @@ from msgspec import Struct
 from potto.calculus.algebra.choices import with_unknown_sides
 from potto.calculus.algebra.point_values import not_zero
 from potto.core import polynomials
-from potto.core.kinds import App, Array, Deriv, Fold, Index, Integral, Lam, Length, ListOf, Sum, Tuple, union_of
 from potto.core.normal_form import as_term as ordered
 from potto.core.normal_form import normal_form
 from potto.core.polynomials import (
@@ -36,6 +35,7 @@ from potto.core.polynomials import (
     total,
     without,
 )
+from potto.core.term_kinds import App, Array, Deriv, Fold, Index, Integral, Lam, Length, ListOf, Sum, Tuple, union_of
 from potto.core.terms import Const, Prim, Term, Var, add, children, div, mul, neg, postorder, prim, rebuild, unknown
 from potto.core.walking import Holding, Kept
 

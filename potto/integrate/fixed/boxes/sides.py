@@ -18,7 +18,7 @@ from msgspec import Struct
 
 from potto.calculus.algebra.degree import degree, plane
 from potto.calculus.solving.enclosable import enclosable
-from potto.core.kinds import union_of
+from potto.core.term_kinds import union_of
 from potto.core.terms import Branch, Integral, Lam, Term, function_of, postorder, tuple_
 from potto.integrate.fixed.boxes.tensor_product import Bounds, BoxIntegrand
 from potto.integrate.fixed.lowered.box_text import NEAR
