@@ -7,6 +7,7 @@ import pytest
 
 import potto
 from potto.integrate import outline
+from potto.runtime.integration.preparation.known_sides import Sided
 from potto.runtime.integration.problem import clear
 
 PROGRAM = """
@@ -124,3 +125,13 @@ def test_few_members_are_each_on_their_sides(module):
     assert alone[1] == pytest.approx([3.5, 1], rel=1e-14)
     edge = 5.2 ** (1 / 3)
     assert 0 < alone[2][1] < 2.5 - edge
+
+
+def test_a_call_looks_once(module, monkeypatch):
+    """A rule for it, what is settled near it and the integral itself all ask; a look takes half of an uncut pixel."""
+    slope, looks, look = potto.deriv(module.seen), [], Sided._within
+    slope((1.0, 1.0), (1.0, 0.0), (9.0, 1.0))
+    monkeypatch.setattr(Sided, "_within", lambda sided, box: looks.append(box) or look(sided, box))
+    for x in (1.01, 1.02):
+        slope((x, 1.0), (1.0, 0.0), (9.0, 1.0))
+    assert [box["x"] for box in looks] == [(1.01, 1.01), (1.02, 1.02)]

@@ -47,6 +47,7 @@ MOST_PARTS = 2000  # of an integrand with calls carried out
 FEW_PARTS, FEW_OF_PLANES, MOST_SURFACES = 11, 100, 32
 
 Side = tuple[Term, bool]
+Box = dict[str, Interval]
 
 
 class Sided(Struct):
@@ -54,7 +55,8 @@ class Sided(Struct):
 
     surfaces: those whose sides can be told, by all calls in them carried out; `ends`: where these stop being defined.
     flat: whether all are affine in each variable by itself. met: what is taken for the integral, by the sides on which
-    all of it lies. left: each of these, and sides that are enough for it.
+    all of it lies. left: each of these, and sides that are enough for it. last: the parameters that were asked for
+    last, and what was left: one call asks up to three times, each of its ways for itself.
     """
 
     term: Integral
@@ -63,10 +65,18 @@ class Sided(Struct):
     flat: bool
     met: dict[tuple[Side, ...], Integral | None] = {}
     left: dict[Integral, frozenset[Side]] = {}
+    last: tuple[Box, Integral | None] | None = None
 
     def at(self, env: dict[str, Value]) -> Integral | None:
         """What is left of it at these parameters; None if that is all, or is not told apart from others."""
-        sides = tuple(self._sides(env))
+        box = _box(env)
+        last = self.last
+        if last is None or last[0] != box:
+            last = self.last = box, self._within(box)
+        return last[1]
+
+    def _within(self, box: Box) -> Integral | None:
+        sides = tuple(self._sides(box))
         if sides not in self.met:
             if len(self.met) >= MOST_SIDES:
                 return self._known(frozenset(sides))
@@ -86,13 +96,9 @@ class Sided(Struct):
         right = [found for found, enough in self.left.items() if enough <= sides]
         return max(right, key=lambda found: len(self.left[found]), default=None)
 
-    def _sides(self, env: dict[str, Value]) -> Iterator[Side]:
-        """The surfaces of which all of the box lies on one side, and whether that is the upper one."""
-        box: dict[str, Interval] = {}
-        for name, value in env.items():
-            if isinstance(value, Cell):
-                off = 0.0 if value.e is None else value.e
-                box[name] = (value.v - off, value.v + off)
+    def _sides(self, parameters: Box) -> Iterator[Side]:
+        """The surfaces of which all of the domain lies on one side, and whether that is the upper one."""
+        box = dict(parameters)
         for variable, ends in zip(self.term.variables, self.term.bounds, strict=True):
             if not all(end.free <= box.keys() and enclosable(end) for end in ends):
                 return
@@ -105,6 +111,16 @@ class Sided(Struct):
         for surface, form in known.items():
             if found[form] and all(found[end] for end in self.ends[form]):
                 yield surface, found[form] > 0
+
+
+def _box(env: dict[str, Value]) -> Box:
+    """The numbers among parameters, with their errors."""
+    box: Box = {}
+    for name, value in env.items():
+        if isinstance(value, Cell):
+            off = 0.0 if value.e is None else value.e
+            box[name] = (value.v - off, value.v + off)
+    return box
 
 
 def sided(term: Integral, inline: Resolve) -> Sided | None:
