@@ -129,7 +129,7 @@ class _Work:
             case Prim(op="hypot"):
                 return length(node)
             case Prim(op=op) if op in _ARITHMETIC:
-                key = node, self.tangents, self.inside
+                key = self._key(node)
                 if key not in self.progress.known:
                     self.progress.pause()
                     self.progress.known[key] = self._shortest(node)
@@ -271,10 +271,14 @@ class _Work:
         """A sum as a product, if its summands share a factor."""
         if not isinstance(base, Prim) or base.op != "add":
             return None
-        known = self.progress.products
-        if (base, self.tangents, self.inside) not in known:
-            known[base, self.tangents, self.inside] = taken_out(base.args, self._factored, self.node, self.tangents)
-        return known[base, self.tangents, self.inside]
+        key, known = self._key(base), self.progress.products
+        if key not in known:
+            known[key] = taken_out(base.args, self._factored, self.node, self.tangents)
+        return known[key]
+
+    def _key(self, node: Term) -> tuple[Term, frozenset[str], frozenset[str]]:
+        """All that the way to write a part depends on: what is bound in it is among the variables of any formula."""
+        return node, self.tangents, self.inside & node.free
 
     def _choices(self, node: Prim) -> Iterator[Term]:
         """Sums by the sides of a choice in them, which leave a product where one side comes to 0."""
@@ -339,6 +343,10 @@ class _Work:
         if not found.top:
             return [ZERO]
         shared = shared_by(list(found.top))
+        if len(found.top) == 1:
+            ((monomial, coefficient),) = found.top.items()
+            under = ((self._sum(found.below), 1),) if found.below != {(): 1} else ()
+            return [self._product(Fraction(coefficient), (monomial, 1), (under, -1))]
         rest = {without(m, shared): c for m, c in found.top.items()}
         scale = content(rest)
         rest = {m: Fraction(c / scale) for m, c in rest.items()}
