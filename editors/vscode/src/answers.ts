@@ -1,6 +1,7 @@
 // What the server answers to commands, shown: values in a message, derivatives in a document of their own.
 import * as vscode from "vscode";
 import type { Server } from "./server";
+import { renamed } from "./text";
 
 const SCHEME = "potto-derivative"; // also the language of these documents: that of programs, with long lines wrapped
 const PAUSE = 150; // ms after the last change, before a derivative that is shown is written anew
@@ -35,12 +36,13 @@ interface Followed {
   readonly all: readonly string[];
 }
 
-/** Derivatives in symbols, as documents that follow the program: also when the definition is renamed. */
+/** Derivatives in symbols, as documents that follow the program: also when the definition is renamed, or its file. */
 export class Derivatives implements vscode.TextDocumentContentProvider, vscode.Disposable {
   private readonly changed = new vscode.EventEmitter<vscode.Uri>();
   readonly onDidChange = this.changed.event;
   private readonly gone: vscode.Disposable;
   private readonly followed = new Map<string, Followed>();
+  private readonly programs = new Map<string, string>(); // of documents whose program has another name by now
   private timer: NodeJS.Timeout | undefined;
 
   constructor(private readonly server: Server) {
@@ -48,6 +50,9 @@ export class Derivatives implements vscode.TextDocumentContentProvider, vscode.D
       vscode.workspace.registerTextDocumentContentProvider(SCHEME, this),
       vscode.workspace.onDidChangeTextDocument((event) => {
         if (event.document.languageId === "potto") this.refreshSoon();
+      }),
+      vscode.workspace.onDidRenameFiles(({ files }) => {
+        for (const { oldUri, newUri } of files) this.move(oldUri.toString(), newUri.toString());
       }),
     );
   }
@@ -60,7 +65,7 @@ export class Derivatives implements vscode.TextDocumentContentProvider, vscode.D
 
   async show(uri: vscode.Uri, name: string): Promise<void> {
     const shown = vscode.Uri.from({ scheme: SCHEME, path: `/derivative of ${name}`, query: uri.toString(), fragment: name });
-    this.followed.delete(shown.toString()); // whatever it was renamed to before, this is its name now
+    for (const names of [this.followed, this.programs]) names.delete(shown.toString()); // of before: this is its name now
     const document = await vscode.workspace.openTextDocument(shown);
     await vscode.languages.setTextDocumentLanguage(document, SCHEME);
     await vscode.window.showTextDocument(document, {
@@ -74,10 +79,24 @@ export class Derivatives implements vscode.TextDocumentContentProvider, vscode.D
   async provideTextDocumentContent(uri: vscode.Uri): Promise<string> {
     try {
       const name = await this.nameNow(uri);
-      const answer = await ask(this.server, "potto.differentiate", uri.query, name);
+      const answer = await ask(this.server, "potto.differentiate", this.program(uri), name);
       return answer?.text ?? "# the language server is not running";
     } catch (error) {
       return `# ${error instanceof Error ? error.message : String(error)}`;
+    }
+  }
+
+  /** The file that a document is about, as it is called now. */
+  private program(uri: vscode.Uri): string {
+    return this.programs.get(uri.toString()) ?? uri.query;
+  }
+
+  private move(from: string, to: string): void {
+    for (const { uri } of vscode.workspace.textDocuments) {
+      const now = uri.scheme === SCHEME ? renamed(this.program(uri), from, to) : undefined;
+      if (now === undefined) continue;
+      this.programs.set(uri.toString(), now);
+      this.refreshSoon();
     }
   }
 
@@ -87,7 +106,7 @@ export class Derivatives implements vscode.TextDocumentContentProvider, vscode.D
     const before = this.followed.get(uri.toString()) ?? { name: uri.fragment, all: [] };
     const found = await vscode.commands.executeCommand<vscode.DocumentSymbol[] | undefined>(
       "vscode.executeDocumentSymbolProvider",
-      vscode.Uri.parse(uri.query),
+      vscode.Uri.parse(this.program(uri)),
     );
     const all = (found ?? []).map((symbol) => symbol.name);
     if (all.length === 0) return before.name;

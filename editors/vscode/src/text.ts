@@ -23,3 +23,8 @@ export function utf16(text: string, codePoints: number): number {
   for (let count = 0; count < codePoints && at < text.length; count++) at += (text.codePointAt(at) ?? 0) > 0xffff ? 2 : 1;
   return at;
 }
+
+/** What a file is called after it, or a folder that it lies in, was given another name; undefined if it was not. */
+export function renamed(uri: string, from: string, to: string): string | undefined {
+  return uri === from || uri.startsWith(`${from}/`) ? to + uri.slice(from.length) : undefined;
+}

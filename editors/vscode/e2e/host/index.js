@@ -204,6 +204,18 @@ const TESTS = {
     const renamed = await run("DocumentRenameProvider", document.uri, find(document, "cover"), "shaded");
     assert.ok(await vscode.workspace.applyEdit(renamed));
     await eventually(() => derivative.getText(), (now) => /^shaded : /.test(now));
+    const moved = vscode.Uri.joinPath(document.uri, "..", "painted.po");
+    const move = async (from, to) => {
+      const edit = new vscode.WorkspaceEdit();
+      edit.renameFile(from, to);
+      assert.ok(await vscode.workspace.applyEdit(edit));
+    };
+    await move(document.uri, moved);
+    const there = await open("painted.po"); // as it is on the disk
+    await there.editor.edit((edit) => edit.insert(find(there.document, "[x + y < t]"), "t*"));
+    await eventually(() => derivative.getText(), (now) => now.includes("t*[x + y < t]"));
+    await vscode.commands.executeCommand("workbench.action.files.revert");
+    await move(moved, document.uri);
   },
 
   async "rename after extracting moves the cursor to the new name"() {

@@ -3,6 +3,7 @@ import { randomBytes } from "node:crypto";
 import { posix } from "node:path";
 import * as vscode from "vscode";
 import type { Server } from "../server";
+import { renamed } from "../text";
 import type { FromPreview, Pixel, PixelRequest, Samples, Scene, ToPreview } from "./messages";
 
 const CONTENT_MODIFIED = -32801;
@@ -111,10 +112,11 @@ class Preview {
 
   /** A file, or a folder, has another name: whether it is ours. */
   private move(from: vscode.Uri, to: vscode.Uri): boolean {
-    const [old, own] = [from.toString(), this.uri.toString()];
-    if (own !== old && !own.startsWith(`${old}/`)) return false;
+    const own = this.uri.toString();
+    const now = renamed(own, from.toString(), to.toString());
+    if (now === undefined) return false;
     panels.delete(own);
-    this.uri = vscode.Uri.parse(to.toString() + own.slice(old.length));
+    this.uri = vscode.Uri.parse(now);
     panels.set(this.uri.toString(), this);
     this.panel.title = title(this.uri);
     return true;

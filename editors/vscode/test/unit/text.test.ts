@@ -1,6 +1,6 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { chunkAt, entryOf, utf16 } from "../../src/text";
+import { chunkAt, entryOf, renamed, utf16 } from "../../src/text";
 
 const PROGRAM = ["# a comment", "def f(x)", "    y = x", "", "    # inside", "    y", "", "# of g", "def g(x) [", "] x", "1"];
 
@@ -21,4 +21,10 @@ test("places are counted in UTF-16", () => {
   assert.equal(utf16("a𝄞b", 2), 3);
   assert.equal(utf16("abc", 2), 2);
   assert.equal(utf16("a", 9), 1);
+});
+
+test("a file follows the name of its folder, and of no other that begins alike", () => {
+  assert.equal(renamed("file:///a/b.po", "file:///a/b.po", "file:///a/c.po"), "file:///a/c.po");
+  assert.equal(renamed("file:///a/b.po", "file:///a", "file:///d/e"), "file:///d/e/b.po");
+  assert.equal(renamed("file:///ab/b.po", "file:///a", "file:///d"), undefined);
 });
