@@ -300,3 +300,16 @@ def test_a_tail_whose_first_nodes_have_no_number() -> None:
     answer = potto.hessian(f)(0.923)
     assert answer.converged and abs(answer.value) <= answer.error < 1e-12
     assert answer.evals < 100_000
+
+
+def test_a_difference_of_distances_runs_along_the_axes() -> None:
+    """|x + y - 1| - |x - y| is 2y - 1, 2x - 1, 1 - 2y or 1 - 2x in the four quarters of the square, and below u in
+    (2 - (1 - u)^2)/8 of each."""
+    u = 0.3 * T
+    f = potto.compile("def f(t) integral ([0, 1], [0, 1]) [abs(x + y - 1) - abs(x - y) < 0.3*t] d(x, y)").f
+    answer = potto.deriv(f)((T, 1.0))
+    assert abs(answer.value - (2 - (1 - u) ** 2) / 2) <= answer.error < 1e-13
+    assert abs(answer.tangent - 0.3 * (1 - u)) <= answer.tangent_error < 1e-13
+    assert answer.evals < 1000  # 277,000 where it was searched for
+    bend = potto.hessian(f)(T)
+    assert abs(bend.value + 0.09) <= bend.error + 1e-16 < 1e-13

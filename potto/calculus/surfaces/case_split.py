@@ -9,13 +9,14 @@ greater.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 from potto.calculus.algebra.ranges import positive
 from potto.calculus.solving.solve import shared_factors
 from potto.calculus.surfaces.cancelled import without_cancelled
 from potto.calculus.surfaces.comparisons import by_brackets, by_signs, of_arguments
 from potto.calculus.surfaces.nested_brackets import has_nested
+from potto.core.simplify import normalized_surface
 from potto.core.terms import (
     Branch,
     Delta,
@@ -44,12 +45,14 @@ MOST = 8  # cases that one condition is taken apart into
 
 def cased(term: Integral) -> Integral:
     """An equal integral, or the same one where there is nothing to take apart."""
-    return _changed(term, lambda node: _settled(node, MOST) if _changes(node) else node)
+    names = frozenset(term.variables)
+    return _changed(term, lambda node: _settled(node, names, MOST) if _changes(node, names) else node)
 
 
 def by_extremes(term: Integral) -> Integral:
     """The same with a condition on a greatest or a least as one on each of them; on abs where that is an `and`."""
-    return _changed(term, lambda node: _settled(node, MOST))
+    names = frozenset(term.variables)
+    return _changed(term, lambda node: _settled(node, names, MOST))
 
 
 def _changed(term: Integral, change: Callable[[Branch], Term]) -> Integral:
@@ -141,10 +144,10 @@ def _split(node: Term, most: int) -> Term:
 
 def _bent(node: Branch) -> bool:
     """Whether a condition is on abs, min, max or clamp of something."""
-    return any(isinstance(part, Prim) and PRIMITIVES[part.op].cases for part in _outside(node.surface))
+    return bool(_bends(node.surface))
 
 
-def _settled(node: Term, most: int) -> Term:
+def _settled(node: Term, names: frozenset[str], most: int) -> Term:
     """A condition on a greatest or a least as one on each of them; one in which it can't be is split by cases if these
     vary with less."""
     if not isinstance(node, Branch) or len(node.coordinates) != 1:
@@ -160,11 +163,11 @@ def _settled(node: Term, most: int) -> Term:
             every = (extreme.op == "max") == (rises < 0)
             # abs(u) > t stays one surface: that it folds at t = 0 tells its one-sided derivatives exactly.
             if every or written is None or not all(arg.free for arg in extreme.args):
-                return _one_by_one(node, part, extreme.args, every, most)
-    return _apart(node, most) if _changes(node) else node
+                return _one_by_one(node, part, extreme.args, every, names, most)
+    return _apart(node, most) if _changes(node, names) else node
 
 
-def _one_by_one(node: Branch, part: Term, args: Sequence[Term], every: bool, most: int) -> Term:
+def _one_by_one(node: Branch, part: Term, args: Sequence[Term], every: bool, names: frozenset[str], most: int) -> Term:
     """A condition with each of some terms in the place of a part: all of them hold, or one.
 
     most: cases of each, as these conditions add up, where cases multiply.
@@ -172,7 +175,7 @@ def _one_by_one(node: Branch, part: Term, args: Sequence[Term], every: bool, mos
     found = node.then if every else node.orelse
     for arg in reversed(args):
         yes, no = (found, node.orelse) if every else (node.then, found)
-        found = _settled(branch((replaced(node.surface, {part: arg}),), node.strict, yes, no), most)
+        found = _settled(branch((replaced(node.surface, {part: arg}),), node.strict, yes, no), names, most)
     return found
 
 
@@ -207,23 +210,54 @@ def _direction(surface: Term, part: Term) -> int:
     return sign
 
 
-def _changes(node: Branch) -> bool:
+def _changes(node: Branch, names: frozenset[str]) -> bool:
     """Whether one of the cases of a condition varies with less than the condition, or not at all, or a factor of one
-    does: |y|*t - y*x is y*(t - x) where y > 0, which has another place in x than where it is not."""
-    parts = [part for part in _outside(node.surface) if isinstance(part, Prim) and PRIMITIVES[part.op].cases]
+    does: |y|*t - y*x is y*(t - x) where y > 0, which has another place in x than where it is not. Or with fewer of
+    some variables: |x + y| - |x - y| is 2y, -2y, 2x or -2x."""
+    parts = _bends(node.surface)
     flat = [part for part in parts if part.op in _FLAT and part.free]
-    return any(arg.free != part.free for part in flat for arg in part.args) or any(
-        factor.free and factor.free != case.free
-        for part in parts
-        for value in PRIMITIVES[part.op].cases(*part.args)[1:]  # type: ignore[misc]
-        if isinstance(case := replaced(node.surface, {part: value}), Prim) and case.op == "add"
-        for factor in shared_factors(case)
+    return (
+        any(arg.free != part.free for part in flat for arg in part.args)
+        or any(
+            factor.free and factor.free != case.free
+            for part in parts
+            for value in PRIMITIVES[part.op].cases(*part.args)[1:]  # type: ignore[misc]
+            if isinstance(case := replaced(node.surface, {part: value}), Prim) and case.op == "add"
+            for factor in shared_factors(case)
+        )
+        or (len(parts) > 1 and any(_free_of(case) & names != node.surface.free & names for case in _cases(node)))
     )
+
+
+def _cases(node: Branch) -> Iterator[Term]:
+    """The surfaces without bends that a condition comes to on the sides of all of them; none if they are too many."""
+    waiting = [(node.surface, MOST)]
+    found: list[Term] = []
+    while waiting:
+        surface, most = waiting.pop()
+        bends = _bends(surface)
+        if not bends:
+            found.append(surface)
+        elif most < 2:
+            return
+        else:
+            values = PRIMITIVES[bends[0].op].cases(*bends[0].args)[1:]  # type: ignore[misc]
+            waiting += [(replaced(surface, {bends[0]: value}), most // 2) for value in values]
+    yield from found
+
+
+def _free_of(surface: Term) -> frozenset[str]:
+    """What a surface varies with once what cancels is gone."""
+    return normalized_surface(surface)[0].free
+
+
+def _bends(surface: Term) -> list[Prim]:
+    return [part for part in _outside(surface) if isinstance(part, Prim) and PRIMITIVES[part.op].cases]
 
 
 def _apart(node: Term, most: int) -> Term:
     assert isinstance(node, Branch)
-    bent = next((part for part in _outside(node.surface) if isinstance(part, Prim) and PRIMITIVES[part.op].cases), None)
+    bent = next(iter(_bends(node.surface)), None)
     if bent is None or most < 2:
         return node
     margin, first, second = PRIMITIVES[bent.op].cases(*bent.args)  # type: ignore[misc]
