@@ -153,6 +153,10 @@ class _Range:
         self.plan, self.number = plan, number
         self.body, self.box = plan.mass, dict(box)
         self.level, self.low, self.high = plan.levels[number].level, low, high
+        # Where a variable further out is infinite nothing is there, though no enclosure tells.
+        infinite = [np.isinf(least) & (least == most) for least, most in self.box.values()]
+        nowhere = np.broadcast_arrays(np.zeros((low.size, 1), dtype=bool), *infinite)
+        self.nowhere = np.logical_or.reduce(nowhere)
 
     def found(self, volume: Array) -> tuple[Array, Array, Array]:
         """The ends of what matters, infinite where none is known, and what is left out at most."""
@@ -201,6 +205,7 @@ class _Range:
         lo, hi = (np.broadcast_to(end, ends[0].shape) for end in enclosure((self.body,), box)[0])
         unknown = np.isnan(lo)
         size = np.where(unknown, 0.0, np.maximum(np.abs(lo), np.abs(hi)))
+        unknown &= ~self.nowhere
         if unknown.any():  # 0 times what overflows
             size = np.where(unknown, self.by_logarithms(ends), size)
         within = volume[:, None]
