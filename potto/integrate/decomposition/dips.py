@@ -17,6 +17,7 @@ from potto.calculus.solving.enclosable import enclosable
 from potto.core.terms import Const, Prim, Term, postorder
 from potto.integrate.decomposition.lines import Watched, apart, box_of, on_lines
 from potto.integrate.decomposition.meetings import Row, as_array
+from potto.integrate.decomposition.turns import Span, cells_of
 from potto.integrate.levels import HINT, LevelPlan
 from potto.integrate.pieces import Evaluator
 from potto.integrate.rules.intervals import enclosure
@@ -29,6 +30,7 @@ FACTOR, TWICE = 8.0, 2.0
 SAMPLES = 17  # of a range, between which there is one least number at most
 SECTIONS, ROUNDS = 8, 18  # of a stretch around it, and how often it is cut into those: to 4^-18
 SETTLED = 1.01  # by what factor a number differs over a stretch on which the least is found; beside a root by far more
+ASIDE = 1 / 32  # from such a part of an infinite range on, which says nothing of its scale
 SHARE = 2.0  # from such a part of the range on nodes see what there is
 GROWTH = 4.0
 DISTANCES = 2.0 ** -np.arange(52.0, 0.0, -1.0)
@@ -71,18 +73,17 @@ def dip_rows(
 ) -> list[Row]:  # fmt: skip
     """Rows around the places within the ranges of members where one of the terms comes near to 0."""
     ends = np.stack([as_array(end.v, batch) for end in (lo, hi)])
-    low, length = ends.min(axis=0), ends.max(axis=0) - ends.min(axis=0)
-    with np.errstate(invalid="ignore"):
-        there = np.flatnonzero(np.isfinite(low) & (length > 0) & (length < np.inf))
-    if not there.size or not _dips_somewhere(terms, inner, variable, env, (low[there].min(), ends[:, there].max())):
+    low, high = ends.min(axis=0), ends.max(axis=0)
+    there = np.flatnonzero(high > low)
+    if not there.size or not _dips_somewhere(terms, inner, variable, env, (low[there].min(), high[there].max())):
         return []
-    search = _Search(terms, inner, variable, env, machine, low, length)
+    search = _Search(terms, inner, variable, env, machine, Span(low, high, np.zeros(batch)))
     term, part, member, place = search.least(there)
     found = []
     for numbers in apart(member):
         x, own = place[numbers], member[numbers]
         for away in search.widths(term[numbers], part[numbers], own, x):
-            inside = (away > low[own]) & (away < low[own] + length[own])
+            inside = (away > low[own]) & (away < high[own])
             if inside.any():
                 row = np.full(batch, np.nan)
                 row[own[inside]] = away[inside]
@@ -97,10 +98,12 @@ def _dips_somewhere(
     box = box_of(inner, variable, env, ends)
     if box is None or any(not term.free <= box.keys() for term in terms.terms):
         return True
-    with np.errstate(invalid="ignore"):
+    if not np.isfinite(ends).all():
+        box[variable] = cells_of(ends)
+    with np.errstate(all="ignore"):
         for least, most in enclosure(terms.terms, box):
             near, far = np.minimum(np.abs(least), np.abs(most)), np.maximum(np.abs(least), np.abs(most))
-            if not (np.all(least * most > 0) and np.all(far <= FACTOR * near)):
+            if np.any(~((least * most > 0) & (far <= FACTOR * near)) & (near < np.inf)):
                 return True
     return False
 
@@ -110,15 +113,15 @@ class _Search:
 
     def __init__(
         self, terms: Watched, inner: Sequence[LevelPlan], variable: str, env: Mapping[str, Value], machine: Evaluator,
-        low: Array, length: Array,
+        span: Span,
     ) -> None:  # fmt: skip
         self.terms, self.inner, self.variable, self.env, self.machine = terms, inner, variable, env, machine
-        self.low, self.length = low, length
+        self.span = span
         self.parts = terms.parts(inner)
 
     def at(self, members: Ints, part: Ints, u: Array) -> Array:
         """All terms (E, ...), at parts u of members' ranges."""
-        places = self.low[members] + u * self.length[members]
+        places = self.span.pick(members).places(u)
         return on_lines(
             self.terms, self.inner, self.variable, self.env, members, self.parts[part], places, self.machine
         )
@@ -141,6 +144,7 @@ class _Search:
             wall = np.full((*size.shape[:2], 1, size.shape[3]), np.inf)
             before, after = (np.concatenate(two, axis=2) for two in ((wall, size[:, :, :-1]), (size[:, :, 1:], wall)))
             lowest = (size <= before) & (size < after) & (FACTOR * size < most) & (size > 0)
+            lowest[:, :, [0, -1]] &= ~self.span.pick(there).endless  # which are run through as fast as these ask for
         term, part, number, member = np.nonzero(lowest)
         if not term.size:
             return term, part, member, u[number]
@@ -173,9 +177,11 @@ class _Search:
             first = DISTANCES[beyond.argmax(axis=0)]
             reached.append(np.where(beyond.any(axis=0) & (first * SHARE < 1), first, np.nan))
         narrow = np.isfinite(reached[0]) | np.isfinite(reached[1])
+        narrow &= ~self.span.pick(members).endless | (np.fmin(*reached) < ASIDE)
         found = [np.where(narrow, u, np.nan)]
         for way, far in zip((1.0, -1.0), reached, strict=True):
             while (near := far * SHARE < 1).any():
                 found.append(u + np.where(near, way * far, np.nan))
                 far = GROWTH * far
-        return [self.low[members] + self.length[members] * place for place in found]
+        span = self.span.pick(members)
+        return [span.places(place) for place in found]

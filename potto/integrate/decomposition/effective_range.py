@@ -31,6 +31,7 @@ FARTHEST = 2.0**964
 HUGE = 2.0**45  # from here on shells are so long that exponents of both signs are not told from each other
 PARTS = 32  # into which that is divided
 PIECES = 4  # of a shell, of each of which it is told how large logarithms are
+APART = 2.0**16  # how far off, in terms of where most of it is, a range ends whose nodes see that
 NOTHING = EPS * EPS  # of what a shell holds at most
 Ranges = dict[str, tuple[Array, Array]]
 
@@ -188,10 +189,11 @@ class _Range:
         most = np.max(held, axis=1, initial=0.0, where=np.isfinite(held))
         row = np.arange(start.size)
         at, left = _first(held, most)
+        peak = np.where(np.isfinite(held), held, -1.0).argmax(axis=1)
         reach = far[row, np.where(at <= SIZES.size, at, 0)]
         most = np.minimum(most, np.max(self.held(side, _parts(start, reach), volume), axis=1, initial=0.0))
         at, left = _first(held, most)
-        known = at <= SIZES.size
+        known = (at <= SIZES.size) & (np.abs(far[row, at] - start) <= APART * np.abs(far[row, peak + 1] - start))
         at = np.where(known, at, 0)
         fine = _parts(far[row, np.maximum(at - 1, 0)], far[row, at])
         within = self.held(side, fine, volume)

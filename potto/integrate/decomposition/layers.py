@@ -18,7 +18,7 @@ from msgspec import Struct
 from potto.core.terms import Term
 from potto.integrate.decomposition.lines import Watched, apart, box_of, on_lines, watched
 from potto.integrate.decomposition.meetings import Row, as_array
-from potto.integrate.decomposition.turns import Span, span_of, turns
+from potto.integrate.decomposition.turns import Span, cells_of, span_of, turns
 from potto.integrate.levels import HINT, LevelPlan
 from potto.integrate.pieces import Evaluator
 from potto.integrate.rules.intervals import Interval, enclosure
@@ -33,9 +33,7 @@ DEPTH, CORE, GONE = 80.0, 4.0, 745.0
 DISTANCES = np.concatenate((4.0 ** -np.arange(20.0, 1.0, -1.0), [0.125]))
 POWER = 4.5
 OWN = 0.25  # the part of how far a layer reaches up to which another place is its own
-# Cells of infinite ranges, an eighth of the distance from -1 or 1 long, and by how much an exponent may change on one.
-CELLS = np.expm1(0.125 * np.arange(200.0))
-EVEN = 12.0
+EVEN = 12.0  # by how much an exponent may change on a cell of an infinite range
 
 
 def exponents_of(body: Term, variable: str, known: frozenset[str]) -> Watched | None:
@@ -87,8 +85,7 @@ def _steep_somewhere(
         return True
     if np.isfinite(ends).all():
         return not change(exponents.terms, box) <= STEEPEST
-    edges = np.clip(np.concatenate((-CELLS[:0:-1], CELLS)), *ends)
-    box[variable] = edges[:-1], edges[1:]
+    box[variable] = cells_of(ends)
     with np.errstate(all="ignore"):
         for least, most in enclosure(exponents.terms, box):
             if np.any(~(most - least <= EVEN) & ~(least > DEPTH) & ~(most < -DEPTH)):

@@ -1,8 +1,8 @@
 """Where along a range numbers cross 0, or turn from rising to falling or back, on a stretch too short for nodes.
 
-Owns `Span`, `span_of`, `Turns` and `turns`. tanh(u) and exp(-u^2) change where u is 0, over a stretch on which u
-changes by 1: where u changes by a thousand over the range no node need be there. u itself is seen from afar, so its
-places are looked for between few samples of it.
+Owns `Span`, `span_of`, `cells_of`, `Turns` and `turns`. tanh(u) and exp(-u^2) change where u is 0, over a stretch on
+which u changes by 1: where u changes by a thousand over the range no node need be there. u itself is seen from afar, so
+its places are looked for between few samples of it.
 """
 
 from __future__ import annotations
@@ -26,6 +26,10 @@ PACE = 8.0  # how long an infinite range is taken to be at a place, in distances
 Values = Callable[[Ints, Array], Array]  # all numbers (E, ...) of members at places
 
 
+# Cells of infinite ranges, an eighth of the distance from -1 or 1 long.
+CELLS = np.expm1(0.125 * np.arange(200.0))
+
+
 class Span(Struct, frozen=True):
     """The ranges of a batch: (B,) each, low <= high, either end infinite. spread: how long an infinite one is, where a
     measure says so, else 0."""
@@ -35,15 +39,18 @@ class Span(Struct, frozen=True):
     spread: Array
 
     def places(self, u: Array) -> Array:
-        """Places (P, B) at parts u (P,) within ranges; of an infinite one they thin out to its end."""
+        """Places at parts u (..., B) of ranges; of an infinite one they thin out to its end."""
         low, high = self.low, self.high
-        u = u[:, None]
         with np.errstate(all="ignore"):
             x = low + u * (high - low)
             x = np.where(np.isinf(high), low + u / (1.0 - u), x)
             x = np.where(np.isinf(low), high - (1.0 - u) / u, x)
             v = 2.0 * u - 1.0
             return np.where(np.isinf(low) & np.isinf(high), v / (1.0 - v * v), x)
+
+    @property
+    def endless(self) -> Bools:
+        return np.isinf(self.low) | np.isinf(self.high)
 
     def lengths(self, x: Array) -> Array:
         """How long ranges are, for what lies at places (..., B)."""
@@ -71,11 +78,17 @@ def span_of(low: Array, high: Array, hints: Sequence[Array]) -> Span:
     return Span(low, high, spread)
 
 
+def cells_of(ends: tuple[float, float]) -> tuple[Array, Array]:
+    """An infinite range, in cells on which what is narrow shows: where these begin and end."""
+    edges = np.clip(np.concatenate((-CELLS[:0:-1], CELLS)), *ends)
+    return edges[:-1], edges[1:]
+
+
 def turns(values: Values, span: Span) -> Turns:
     """Places at which numbers cross 0, or have an extremum, and change by more than SEEN between samples."""
     members = np.arange(span.low.size)
     u = np.linspace(0.0, 1.0, SAMPLES if members.size <= MANY else (SAMPLES + 1) // 2)
-    x = span.places(u)
+    x = span.places(u[:, None])
     found = values(np.broadcast_to(members, x.shape), x)
     zeros, peaks = _between(found)
     number, at, member = (np.concatenate(both) for both in zip(np.nonzero(zeros), np.nonzero(peaks), strict=True))

@@ -12,12 +12,13 @@ from typing import Any
 import numpy as np
 
 from potto.core.terms import Branch, Const, If, Prim, Term
-from potto.integrate.rules.intervals import INTERVALS, Interval, marked
+from potto.integrate.rules.intervals import ANYTHING, INTERVALS, Interval, marked
 from potto.kernels.support import OPS
 from potto.primitives import PRIMITIVES, Primitive
 from potto.primitives.registry import Size
 from potto.primitives.walking import Domain, Rule
 
+LARGEST, ROUNDED = 700.0, 1e-9  # logarithms up to which exponentials are numbers, and by how much they may be off
 UNKNOWN = Size(-np.inf, np.inf, -np.inf, np.inf)
 SMALLEST = 2.0**-1000  # from which on doubles have all digits: below, a bound of 0 may be one of what is not nothing
 
@@ -25,15 +26,17 @@ SMALLEST = 2.0**-1000  # from which on doubles have all digits: below, a bound o
 def log_magnitude(term: Term, box: Mapping[str, Interval]) -> Any:
     """A bound of log(abs(term)) over a box; infinite where none is known."""
     with np.errstate(all="ignore"):
-        env = {name: _sized(ends, (-np.inf, np.inf)) for name, ends in box.items()}
+        env = {name: _sized(ends, (-np.inf, np.inf), ANYTHING) for name, ends in box.items()}
         return SIZES.walk((term,), env, {})[0].most
 
 
-def _sized(ends: Interval, logs: tuple[Any, Any]) -> Size:
-    """What bounds and logarithms say together."""
-    lo, hi = (np.where(np.isnan(end), far, end) for end, far in zip(ends, (-np.inf, np.inf), strict=True))
+def _sized(ends: Interval, logs: tuple[Any, Any], image: Interval) -> Size:
+    """What bounds and logarithms say together, of what has values between others. Bounds that overflow are unknown."""
+    lo, hi = (np.where(np.isnan(end), far, end) for end, far in zip(ends, image, strict=True))
+    least, most = (np.where(np.isnan(log), far, log) for log, far in zip(logs, ANYTHING, strict=True))
+    if image[0] >= 0:
+        lo = np.maximum(lo, np.exp(np.minimum(least, LARGEST) - ROUNDED))
     farthest, nearest = np.maximum(-lo, hi), np.maximum(np.maximum(lo, -hi), 0.0)
-    least, most = (np.where(np.isnan(log), far, log) for log, far in zip(logs, (-np.inf, np.inf), strict=True))
     most = np.where(farthest >= SMALLEST, np.fmin(most, np.log(farthest)), most)
     return Size(lo, hi, np.fmax(least, np.log(nearest)), most)
 
@@ -56,9 +59,9 @@ class _Sizes(Domain[Size]):
         ends = INTERVALS.builtin(node, {arg: marked(x.lo, x.hi) for arg, x in zip(node.args, args, strict=True)})
         rule = PRIMITIVES[node.op].magnitude
         if rule is not None:
-            return _sized(ends, rule(OPS, *args))
+            return _sized(ends, rule(OPS, *args), PRIMITIVES[node.op].image)
         whole = self.apply(node.op, args)
-        return _sized(ends, (whole.least, whole.most))
+        return _sized(ends, (whole.least, whole.most), PRIMITIVES[node.op].image)
 
     def other(self, node: Term, known: Mapping[Term, Size]) -> Size:
         if not isinstance(node, Branch | If):
