@@ -33,3 +33,15 @@ def test_errors_cover_what_rounding_does(
         answer = f(t)
         with mp.workdps(40):
             assert abs(mp.mpf(answer.value) - exact(mp.mpf(t))) <= answer.error <= 1e-7
+
+
+@pytest.mark.parametrize("t", [0.01, 0.003, 3e-4, 1e-5])
+def test_states_beside_a_saddle_by_their_level(t: float) -> None:
+    """Of one band in two dimensions, and how many more there are a little higher. Nodes that crowd at the end of what
+    has roots are where nothing is known of an inverse root, not even how far off it is."""
+    f = potto.deriv(potto.compile("def f(t) integral ([0, pi], [0, pi]) delta(cos(x) + cos(y) - t) d(x, y)").f)
+    found = f((t, 1.0))
+    with mp.workdps(40):
+        states, rate = mp.ellipk(1 - mp.mpf(t) ** 2 / 4), mp.diff(lambda u: mp.ellipk(1 - u**2 / 4), mp.mpf(t))
+        assert abs(mp.mpf(found.value) - states) <= found.error <= 1e-9
+        assert abs(mp.mpf(found.tangent) - rate) <= found.tangent_error <= 1e-6 * abs(rate)

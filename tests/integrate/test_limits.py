@@ -101,8 +101,8 @@ def test_a_summand_takes_nothing_from_another() -> None:
 
 
 def test_places_beside_a_fold_are_not_looked_at_once_far_more_than_the_budget_is_spent() -> None:
-    """A circle that touches the bound z = 1 at t = 1: six looks beside t took 16 million evaluations of 200,000. The
-    derivative is not known then, and said not to be."""
+    """A circle that touches the bound z = 1 at t = 1: six looks beside t took 16 million evaluations of 200,000. By
+    mpmath, from the integral over the circle, and over what is within it."""
     condition = "y^2 - z^2 <= 0.4*y or y^2 + z^2 >= t or x - y < t"
     f = potto.compile(
         "def f(t) integral [-inf, inf] (integral [-1, 2] (integral (z ~ triangular(-1, 0, 1))"
@@ -110,7 +110,8 @@ def test_places_beside_a_fold_are_not_looked_at_once_far_more_than_the_budget_is
     ).f
     with potto.settings(max_evals=200_000):
         slope = potto.deriv(f)((1.0, 1.0))
-    assert slope.evals <= 5 * 200_000 and not slope.converged and not slope.tangent_error < math.inf
+    assert slope.evals <= 5 * 200_000 and not slope.converged
+    assert abs(slope.tangent - 0.14774903088707887) <= slope.tangent_error < 1e-3
 
 
 def test_an_end_with_a_value_of_its_own_is_not_looked_for_everywhere(monkeypatch: pytest.MonkeyPatch) -> None:

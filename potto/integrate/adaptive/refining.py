@@ -183,20 +183,23 @@ def replaced(work: PanelBatch, old: Pieces, new: Pieces, order: int, tally: Tall
 
 
 def measured(work: PanelBatch, new: Pieces, order: int) -> Pieces:
-    """Pieces of segments, measured; those that are graded once more, with more nodes, or as they are."""
+    """Pieces of segments, measured; those that are graded once more, with more nodes, or as they are: which they stay
+    where they are smooth so, or nodes that crowd lie where rounding leaves less than more nodes would miss."""
     new = work.measure(new, order)
     promising = (new.error <= PROMISING * by_either_form(work, new.size)).all(axis=0)
     if (graded := np.nonzero((new.end != 0) & promising)[0]).size:
         new.held_against(work.measure(new.places(graded), order + MORE), graded)
     turning = work.seg.turning[new.segment]
     steep = np.abs(new.end) * np.where(turning, 2, 1) > GRADE
-    if (rough := np.nonzero(steep & (new.error + turning * new.floor > ROUGH * new.size).any(axis=0))[0]).size:
+    if (rough := np.nonzero(steep & ~(new.error + turning * new.floor <= ROUGH * new.size).all(axis=0))[0]).size:
         level = new.places(rough)
         level.end = np.zeros(rough.size, dtype=np.int64)
         level = work.measure(level, order).settled()
         least = np.maximum(SMOOTH * by_either_form(work, level.size), turning[rough] * ROUNDED * level.floor)
         smooth = (level.error <= least).all(axis=0)
-        new.settled().put(rough[smooth], level.pick(smooth))
+        before, off = new.pick(rough), level.error + level.floor
+        known = ~(before.floor <= off).all(axis=0) & ~(before.error + before.floor < off).any(axis=0)
+        new.settled().put(rough[smooth | known], level.pick(smooth | known))
     return new
 
 
