@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from potto.calculus.algebra.ranges import range_of
 from potto.core.terms import Branch, Const, If, Prim, Term
 from potto.integrate.rules.intervals import ANYTHING, INTERVALS, Interval, marked
 from potto.kernels.support import OPS
@@ -57,6 +58,9 @@ class _Sizes(Domain[Size]):
     def builtin(self, node: Prim, known: Mapping[Term, Size]) -> Size:
         args = [known[arg] for arg in node.args]
         ends = INTERVALS.builtin(node, {arg: marked(x.lo, x.hi) for arg, x in zip(node.args, args, strict=True)})
+        if not ((ends[0] >= 0) | (ends[1] <= 0)).all():  # 1/exp(x) is positive where exp(x) is 0 in doubles, too
+            told = range_of(node)
+            ends = np.fmax(ends[0], told.lo), np.fmin(ends[1], told.hi)
         rule = PRIMITIVES[node.op].magnitude
         if rule is not None:
             return _sized(ends, rule(OPS, *args), PRIMITIVES[node.op].image)
