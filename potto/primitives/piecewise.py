@@ -12,7 +12,7 @@ from itertools import combinations
 from potto.core.terms import ONE, ZERO, Term, add, branch, const, div, mul, neg, prim, sub
 from potto.primitives.bounds import ends, extreme
 from potto.primitives.registry import Elementwise, Ends, Primitive, Quantity, Terms, register
-from potto.primitives.sizes import of_same_size
+from potto.primitives.sizes import of_one_of, of_same_size
 
 
 def _absolute_roots(y: Term) -> Terms:
@@ -106,6 +106,7 @@ minimum = register(
         cases=_least,
         interval=extreme(least=True),
         doc="The least of two or more numbers.",
+        magnitude=of_one_of,
         partials=lambda *args: _choose("min", args),
         domain=((-1e6, 1e6),),
         kinks=_differences,
@@ -125,6 +126,7 @@ maximum = register(
         cases=_greatest,
         interval=extreme(least=False),
         doc="The greatest of two or more numbers.",
+        magnitude=of_one_of,
         partials=lambda *args: _choose("max", args),
         domain=((-1e6, 1e6),),
         kinks=_differences,

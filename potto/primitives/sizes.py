@@ -19,6 +19,14 @@ def of_same_size(ops: Elementwise, x: Size) -> Logs:
     return x.least, x.most
 
 
+def of_one_of(ops: Elementwise, *args: Size) -> Logs:
+    """Of what is one of its arguments."""
+    least, most = args[0].least, args[0].most
+    for x in args[1:]:
+        least, most = ops.least(least, x.least), ops.most(most, x.most)
+    return least, most
+
+
 def of_root(ops: Elementwise, x: Size) -> Logs:
     return 0.5 * x.least, 0.5 * x.most
 

@@ -58,7 +58,7 @@ class _Sizes(Domain[Size]):
     def builtin(self, node: Prim, known: Mapping[Term, Size]) -> Size:
         args = [known[arg] for arg in node.args]
         ends = INTERVALS.builtin(node, {arg: marked(x.lo, x.hi) for arg, x in zip(node.args, args, strict=True)})
-        if not ((ends[0] >= 0) | (ends[1] <= 0)).all():  # 1/exp(x) is positive where exp(x) is 0 in doubles, too
+        if not np.all((ends[0] >= 0) | (ends[1] <= 0)):  # 1/exp(x) is positive where exp(x) is 0 in doubles, too
             told = range_of(node)
             ends = np.fmax(ends[0], told.lo), np.fmin(ends[1], told.hi)
         rule = PRIMITIVES[node.op].magnitude
