@@ -21,6 +21,7 @@ from potto.core.terms import (
     Branch,
     Delta,
     If,
+    Index,
     Integral,
     Prim,
     Term,
@@ -88,7 +89,7 @@ def by_choices(term: Term) -> Term:
 
 
 def _chosen(node: Branch | Delta) -> Term:
-    choice = next((part for c in node.coordinates for part in _outside(c) if isinstance(part, If)), None)
+    choice = next((part for part in postorder(*node.coordinates, below=_values) if isinstance(part, If)), None)
     if choice is None:
         return node
 
@@ -266,6 +267,13 @@ def _apart(node: Term, most: int) -> Term:
         coordinates = tuple(replaced(c, {bent: value}) for c in node.coordinates)
         cases.append(_apart(branch(coordinates, node.strict, node.then, node.orelse), most // 2))
     return branch((margin,), False, cases[0], cases[1])
+
+
+def _values(node: Term) -> Sequence[Term]:
+    """The parts of a term that numbers come from: which element of an array is meant is no choice between surfaces."""
+    if bound_names(node):
+        return ()
+    return (node.array,) if isinstance(node, Index) else children(node)
 
 
 def _outside(surface: Term) -> list[Term]:
