@@ -232,7 +232,7 @@ def _tried(
     few = todo[:: max(1, todo.size // PILOTS)]
     first = tried[: PROBE + 1]
     foreseen = first[-1].foreseen(env, few, first)
-    later = (rule.good(rule.applied(env, few)) for rule in tried[PROBE + 1 : -1])
+    later = (fine for rule in tried[PROBE + 1 : -1] for fine in rule.foreseen(env, few, [rule]))
     good = (number for number, fine in enumerate(itertools.chain(foreseen, later)) if fine.mean() >= ENOUGH)
     number = next(good, len(tried) - 1)
     return [_after(tried, number), *tried[number + 1 :]]
