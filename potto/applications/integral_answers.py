@@ -92,7 +92,7 @@ class Answers:
         wrt = self.wrt if self.wrt in found.parameters else found.moving
         return {
             "values": found.values, "wrt": wrt, "indices": found.indices, "integrals": len(found.regions(wrt)),
-            "functions": found.functions, "fits": found.fits, **self._text(found.name),
+            "functions": found.functions, "fits": found.fits, "sections": found.sections, **self._text(found.name),
         }  # fmt: skip
 
     def _formulas(self, name: str) -> list[dict[str, str]]:
@@ -122,16 +122,17 @@ class Answers:
         found = self._scene(asked)
         values = {name: float(asked["values"][name]) for name in found.values}
         wrt, which = str(asked["wrt"]), int(asked["which"])
+        sections = {str(each): float(at) for each, at in (asked.get("sections") or {}).items()}
         ghost = float(asked.get("ghost") or 0.0) or None  # a step of 0 shows no difference
         start = time.perf_counter()
         with settings(rtol=QUICK) if asked.get("quick") else nullcontext():
-            shot = found.look(values, wrt, which, ghost, bool(asked.get("nodes")), bool(asked.get("quick")))
+            shot = found.look(values, wrt, which, ghost, bool(asked.get("nodes")), bool(asked.get("quick")), sections)
         svg = integral_svg(shot.view, dark=bool(asked.get("dark")))
         seconds = time.perf_counter() - start
         return {
             "svg": svg, "numbers": msgspec.to_builtins(shot.numbers), "told": told(shot.numbers, wrt),
             "surfaces": _surfaces(shot), "remarks": remarks(shot.view), "indices": shot.indices, "seconds": seconds,
-            "slow": seconds > FRAME,
+            "sections": {held.name: (held.at, held.low, held.high) for held in shot.view.held}, "slow": seconds > FRAME,
         }  # fmt: skip
 
 

@@ -142,7 +142,7 @@ def told(numbers: IntegralNumbers | None, wrt: str) -> list[tuple[str, str]]:
 
 def remarks(view: IntegralView) -> list[str]:
     """What the picture leaves out."""
-    found = [f"section at {name} = {format_digits(value, 4)}" for name, value in view.held]
+    found = [f"section at {held.name} = {format_digits(held.at, 4)}" for held in view.held]
     found += ["the domain goes on beyond what is drawn"] if view.cut else []
     return [*found, "surfaces of a sum's conditions are not drawn"] if view.unseen else found
 

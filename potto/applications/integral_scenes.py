@@ -14,7 +14,7 @@ from msgspec import Struct
 
 from potto.applications.integral_numbers import IntegralNumbers, numbers
 from potto.applications.integral_pictures import integral_svg, words
-from potto.applications.integral_views import FRAME, IntegralView, Viewer
+from potto.applications.integral_views import FRAME, SEEN, IntegralView, Viewer
 from potto.calculus.explanation.notation import written_notation
 from potto.checking.regions import DrawnIntegral, indices, regions
 from potto.core.terms import ZERO, Lam, Term, app, lam, tuple_, var
@@ -35,6 +35,7 @@ AGAIN = 0.25  # seconds between numbers that do not fit into a frame
 
 
 Standing = tuple[float, float, float]  # of an index: the number that it stands on, the first and the last
+Counted = tuple[str, int, float | None, tuple[tuple[str, float], ...]]  # what numbers are of: all but what is seen
 
 
 class Shot(Struct, frozen=True):
@@ -58,7 +59,8 @@ class IntegralScene:
 
     given: texts for parameters; the others start as a live expression gives them. `values` has the numbers by name, a
     tuple's as `p_1`, `p_2`, a record's as `p.field`, and those of indices of sums and arrays around integrals: what is
-    seen is one summand, the first if nobody says which. `parameters`: the names of those that can move.
+    seen is one summand, the first if nobody says which. `sections`: where variables that are not seen are said to
+    stand. `parameters`: the names of those that can move.
     `functions`: the texts that stand for parameters that are functions; `fits`: what else is offered for each.
     """
 
@@ -84,20 +86,30 @@ class IntegralScene:
         self.term = lam(tuple(self.values), call)
         self.parameters = tuple(self.values)
         self._indices = indices(world.db, self.term)
-        names = [*(p.name for p in found.parameters), *(index.name for index in self._indices)]
-        unknown = sorted(given.keys() - set(names))
-        if unknown:
-            raise wrong_call(f"`{name}` has no parameter `{unknown[0]}`", f"its parameters are {', '.join(names)}")
         self._regions: dict[str, tuple[DrawnIntegral, ...]] = {}
+        self.sections = self._sections(found, given)
         self._viewers: dict[tuple[str, int], Viewer] = {}
         self._took: dict[tuple[str, int], float] = {}  # seconds that numbers took last
         self._told: dict[tuple[str, int], float] = {}  # when that was
         self._functions: dict[Lam, TermFunction] = {}
+        self._fine: tuple[Counted, IntegralNumbers] | None = None  # the newest numbers of a look that was not quick
         for index in self._indices:
             said = given.get(index.name)
             self.values[index.name] = self._given(said, 1)[0] if said else -math.inf  # that is the first
         self.indices = self.standing(self.values)
         self.values |= {index: at for index, (at, _, _) in self.indices.items()}
+
+    def _sections(self, found: Scene, given: Mapping[str, str]) -> dict[str, float]:
+        """Where variables that are not seen are said to stand: what is given beside parameters and indices."""
+        names = [*(p.name for p in found.parameters), *(index.name for index in self._indices)]
+        beside = sorted(given.keys() - set(names))
+        if beside:
+            hidden = dict.fromkeys(n for r in self.regions(self.parameters[0]) for n in r.variables[SEEN:])
+            unknown = [each for each in beside if each not in hidden]
+            if unknown:
+                raise wrong_call(f"`{self.name}` has no parameter `{unknown[0]}`",
+                                 f"its parameters are {', '.join((*names, *hidden))}")  # fmt: skip
+        return {name: self._given(given[name], 1)[0] for name in beside}
 
     def _arguments(self, found: Scene, given: Mapping[str, str]) -> list[Term]:
         """What each parameter is given; `values` is filled on the way."""
@@ -182,11 +194,12 @@ class IntegralScene:
 
     def look(
         self, values: Mapping[str, float], wrt: str, which: int = 0, ghost: float | None = None, nodes: bool = False,
-        quick: bool = False,
+        quick: bool = False, sections: Mapping[str, float] | None = None,
     ) -> Shot:  # fmt: skip
         """The integral number `which`, from 0, with these values; `ghost`: the step of what is seen of differences,
-        `nodes`: also where it was evaluated. A `quick` one is coarser, and mostly without numbers where these do not
-        fit into a frame. Raises PottoError where it has no value."""
+        `nodes`: also where it was evaluated, `sections`: where variables that are not seen stand. A `quick`
+        one is coarser, and mostly without numbers where these do not fit into a frame. Raises PottoError where it has
+        no value."""
         known, standing = self.regions(wrt), self.standing(values)
         values = {**values, **{index: at for index, (at, _, _) in standing.items()}}
         if not 0 <= which < len(known):
@@ -194,17 +207,32 @@ class IntegralScene:
         key = wrt, which
         viewer = self._viewers.setdefault(key, Viewer(known[which], self._compiled, self._parts))
         begun = time.perf_counter()
-        seen = viewer.look(values, wrt, ghost or 0.0, nodes, quick)
-        found, start = None, time.perf_counter()
-        took, since = self._took.get(key, 0.0), start - self._told.get(key, -math.inf)
-        if not quick or took <= FRAME - (start - begun) or (took <= PATIENCE and since > AGAIN):
-            found = numbers(known[which], self._compiled, values, wrt, ghost, quick)
-            self._told[key] = time.perf_counter()
-            if quick:
-                self._took[key] = self._told[key] - start
+        seen = viewer.look(values, wrt, ghost or 0.0, nodes, quick, sections)
+        found = self._numbers(key, values, ghost, quick, time.perf_counter() - begun)
         given = {name: f"{value:.4g}" for name, value in values.items()} | self.functions
         title = f"{self.name}({', '.join(f'{name} = {text}' for name, text in given.items())})"
         return Shot(seen, found, title, wrt, standing)
+
+    def _numbers(
+        self, key: tuple[str, int], values: Mapping[str, float], ghost: float | None, quick: bool, seconds: float
+    ) -> IntegralNumbers | None:
+        """The numbers of a look whose picture took some seconds, if there is time for them. Where only a section has
+        moved they are known."""
+        wrt, which = key
+        counted = wrt, which, ghost, tuple(values.items())
+        if self._fine is not None and self._fine[0] == counted:
+            return self._fine[1]
+        start = time.perf_counter()
+        took, since = self._took.get(key, 0.0), start - self._told.get(key, -math.inf)
+        if quick and took > FRAME - seconds and (took > PATIENCE or since <= AGAIN):
+            return None
+        found = numbers(self.regions(wrt)[which], self._compiled, values, wrt, ghost, quick)
+        self._told[key] = time.perf_counter()
+        if quick:
+            self._took[key] = self._told[key] - start
+        else:
+            self._fine = counted, found
+        return found
 
     def _compiled(self, term: Lam) -> TermFunction:
         if term not in self._functions:

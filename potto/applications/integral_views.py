@@ -2,7 +2,7 @@
 
 Owns `IntegralView` and `Viewer`. A viewer belongs to one integral of one function; asking it again with other numbers
 compiles nothing. In one variable surfaces are points and the boundary term is their sum, in two they are lines and it
-is the integral along them; of more variables the first two are seen, the others stand in the middle of their ranges.
+is the integral along them; of more variables the first two are seen, in a section where the others stand.
 """
 
 from __future__ import annotations
@@ -27,6 +27,7 @@ PLACES = 257  # along a curve
 SIDE = 97  # along a side of a square
 QUICK_SIDE, COARSEST = 49, 17  # while something is dragged: as many as fit into a frame
 FRAME = 0.016  # seconds
+SEEN = 2  # variables, at most; of more there is a section
 REACH = 6.0  # how far an endless range is drawn
 ARROWS = 24  # of one surface, at most
 NODES = 1500
@@ -49,6 +50,15 @@ class Arrow(Struct, frozen=True):
     weight: float
 
 
+class Section(Struct, frozen=True):
+    """A variable that is not seen: where it stands, and from where to where it may."""
+
+    name: str
+    at: float
+    low: float
+    high: float
+
+
 class SurfaceView(Struct, frozen=True):
     """A surface inside of the domain. lines: from and to, in one variable the same point twice. condition: its equation
     as the program tells it, where parts of a parameter have no names of their own."""
@@ -65,9 +75,9 @@ class IntegralView(Struct, frozen=True):
 
     box: from and to of each variable that is seen. cells: at the places of `integrand` the number of the cell, one for
     each way that the surfaces can be on their sides; -1 outside of the domain. integrand: PLACES numbers, or rows
-    from below. held: the variables that are not seen, and where they stand. ghosts: where surfaces and bounds are
-    when the parameter is a step less, and a step more. nodes: where the integrand was evaluated for the value.
-    outline: the corners of the domain, piece by piece, where that is not all of the box.
+    from below. held: the variables that are not seen. ghosts: where surfaces and bounds are
+    when the parameter is a step less, and a step more. nodes: where the integrand was evaluated for the value. outline:
+    the corners of the domain, piece by piece, where that is not all of the box.
     """
 
     variables: tuple[str, ...]
@@ -76,7 +86,7 @@ class IntegralView(Struct, frozen=True):
     cells: tuple[tuple[int, ...], ...]
     surfaces: tuple[SurfaceView, ...]
     bounds: tuple[Arrow, ...]
-    held: tuple[tuple[str, float], ...] = ()
+    held: tuple[Section, ...] = ()
     cut: bool = False  # whether a range goes on beyond what is drawn
     unseen: bool = False  # whether there are surfaces that are not drawn
     ghosts: tuple[tuple[Line, ...], tuple[Line, ...]] = ((), ())
@@ -92,17 +102,19 @@ class Viewer:
         self.region = region
         self._written = {**{name: name.rstrip("_") for name in region.variables}, **(parts or {})}
         self._compiled = compile
-        self.seen = region.variables[:2]
+        self.seen = region.variables[:SEEN]
         self._quick_side = QUICK_SIDE
 
     def look(
-        self, given: Mapping[str, float], wrt: str = "", ghost: float = 0.0, nodes: bool = False, quick: bool = False
-    ) -> IntegralView:
-        """The view with these parameters; with ghosts for steps of `wrt`, and nodes, if they are wanted; a `quick` one
-        is as coarse as a frame asks for. Raises PottoError where the integrand has no value."""
+        self, given: Mapping[str, float], wrt: str = "", ghost: float = 0.0, nodes: bool = False, quick: bool = False,
+        sections: Mapping[str, float] | None = None,
+    ) -> IntegralView:  # fmt: skip
+        """The view with these parameters; `sections`: where variables that are not seen stand, those left out in the
+        middle of their ranges, and none beyond its range. With ghosts for steps of `wrt`, and nodes, if they are
+        wanted; a `quick` one is as coarse as a frame asks for. Raises PottoError where the integrand has no value."""
         start = time.perf_counter()
         places: dict[str, Any] = {**given, **dict.fromkeys(self.region.variables, 0.0)}
-        box, held, cut = self._ranges(places)
+        box, held, cut = self._ranges(places, sections or {})
         count = PLACES if len(box) == 1 else self._quick_side if quick else SIDE
         grids = [np.linspace(low, high, count) for low, high in box]
         at = {**places, **self._mesh(grids)}
@@ -229,10 +241,13 @@ class Viewer:
     def _number(self, term: Lam, at: Mapping[str, Any]) -> float:
         return float(self._numbers(term, at))
 
-    def _ranges(self, places: dict[str, Any]) -> tuple[list[tuple[float, float]], list[tuple[str, float]], bool]:
-        """The box of what is seen, and the middles of the others; `places` is given the middles of all."""
+    def _ranges(
+        self, places: dict[str, Any], sections: Mapping[str, float]
+    ) -> tuple[list[tuple[float, float]], list[Section], bool]:
+        """The box of what is seen, and the sections through the others; `places` is given where these stand, and the
+        middles of what is seen."""
         box: list[tuple[float, float]] = []
-        held: list[tuple[str, float]] = []
+        held: list[Section] = []
         cut = False
         for name, (from_, to) in zip(self.region.variables, self.region.bounds, strict=True):
             at = dict(places)
@@ -247,7 +262,8 @@ class Viewer:
             if name in self.seen:
                 box.append((low, high))
             else:
-                held.append((name, places[name]))
+                places[name] = min(max(sections.get(name, places[name]), low), high)
+                held.append(Section(name, places[name], low, high))
         return box, held, cut
 
     def _inside(self, at: Mapping[str, Any]) -> Any:

@@ -22,7 +22,8 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", metavar="FILE", help="the program")
     parser.add_argument("name", metavar="NAME", nargs="?", help="the function whose integral is seen")
     parser.add_argument("given", metavar="NAME=EXPR", nargs="*", type=assignment, help="what parameters are given; "
-                        "others start as a live expression of the file gives them, or as 0.5")  # fmt: skip
+                        "others start as a live expression of the file gives them, or as 0.5; also where a variable "
+                        "that is not seen stands, else in the middle of its range")  # fmt: skip
     parser.add_argument("--wrt", metavar="NAME", help="the parameter that moves (default: the first on which the "
                         "derivative depends)")  # fmt: skip
     parser.add_argument("--integral", metavar="N", type=_count, default=1, help="which one of several (default 1)")
@@ -85,7 +86,9 @@ def run(options: argparse.Namespace, console: Console) -> int:
         with settings(**asdict(chosen)):
             found = IntegralScene(world, file, options.name, dict(options.given))
             wrt = options.wrt or found.moving
-            shot = found.look(found.values, wrt, options.integral - 1, options.step, options.nodes)
+            shot = found.look(
+                found.values, wrt, options.integral - 1, options.step, options.nodes, sections=found.sections
+            )
     except PottoError as error:
         return fail(error, options, console)
     if path is not None and not _written(path, shot.svg, console):

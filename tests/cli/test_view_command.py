@@ -31,6 +31,14 @@ def test_values_start_as_a_live_expression_gives_them(potto: Potto) -> None:
     assert answer["numbers"]["boundary"] == pytest.approx(2.0)
 
 
+def test_a_section_stands_where_it_is_said(potto: Potto, tmp_path: Path) -> None:
+    program = "def f(t) integral ([0, 1], [0, 1], [0, 2]) [x + y + z < t] d(x, y, z)\n#> f(1)\n"
+    assert potto("view", "main.po", "f", "z=0.25", "-o", "f.svg", main=program).status == 0
+    assert "section at z = 0.25" in (tmp_path / "f.svg").read_text(encoding="utf-8")
+    told = potto("view", "main.po", "f", "x=0.25", "-o", "f.svg", main=program)
+    assert told.status == 1 and "no parameter `x`" in told.err and "t, z" in told.err
+
+
 def test_what_is_wrong_is_said(potto: Potto) -> None:
     assert potto("view", "main.po", "f", "q=1", "-o", "f.svg", main=PROGRAM).status == 1
     assert "no parameter `q`" in potto("view", "main.po", "f", "q=1", "-o", "f.svg", main=PROGRAM).err

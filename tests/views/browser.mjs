@@ -82,10 +82,28 @@ try {
   await settled();
   seen.ground = await page.locator("body").evaluate((body) => getComputedStyle(body).backgroundColor);
   await page.screenshot({ path: join(folder, "view-dark.png"), fullPage: true });
+  // A section of three variables is dragged along the third; its numbers stay.
+  await page.locator("#name").selectOption("ball");
+  const section = page.locator('#sliders .section input');
+  await section.waitFor();
+  await settled();
+  const whole = await numbers();
+  seen.section = await section.evaluate((input) => [input.dataset.parameter, input.value, input.min, input.max]);
+  const along = await section.boundingBox();
+  await page.mouse.move(along.x + along.width / 2, along.y + along.height / 2);
+  await page.mouse.down();
+  for (let step = 1; step <= 20; step++) await page.mouse.move(along.x + along.width * (0.5 + 0.01 * step), along.y + along.height / 2);
+  await page.mouse.up();
+  await page.waitForFunction(() => !busy && !newest && !dragged);
+  seen.sectionThen = Number(await section.inputValue());
+  seen.sectioned = await page.locator("#now .list").innerText();
+  seen.sectionNumbers = [whole, await numbers()].map((each) => each.join());
+  await page.screenshot({ path: join(folder, "view-section.png"), fullPage: true });
   // The range of an index may depend on that of another one.
   await page.locator("#name").selectOption("nested");
   const index = (name) => page.locator(`input[data-parameter="${name}"]`);
   await index("j").waitFor();
+  seen.unsectioned = await page.locator("#sliders .section").count();
   await settled();
   seen.inner = [await index("j").inputValue(), await index("j").getAttribute("min")];
   await index("i").focus();

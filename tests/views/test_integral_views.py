@@ -126,8 +126,23 @@ def test_surfaces_that_are_not_drawn_are_told() -> None:
 def test_of_three_variables_a_section_is_seen() -> None:
     shot = looked("ball", "r", r=0.7)
     assert shot.view.variables == ("x", "y")
-    assert shot.view.held == (("z", 0.0),)
+    assert [(held.name, held.at) for held in shot.view.held] == [("z", 0.0)]
     assert shot.numbers.boundary == pytest.approx(4 * math.pi * 0.49, abs=1e-11)
+
+
+def test_a_section_is_moved_along_the_variable_that_is_not_seen() -> None:
+    """At z a ball is a disc of radius sqrt(r^2 - z^2), whose edge gains 2*pi*r whatever z is. Numbers stay."""
+    world = World()
+    scene = IntegralScene(world, world.put("program.po", PROGRAM), "ball", {"r": "0.7", "z": "0.3"})
+    assert scene.sections == {"z": 0.3}
+    shots = [scene.look(scene.values, "r", sections={"z": z}) for z in (0.3, -0.5, 3.0)]
+    for shot, radius in zip(shots[:2], (math.sqrt(0.4), math.sqrt(0.24)), strict=True):
+        (surface,) = shot.view.surfaces
+        assert all(math.hypot(*arrow.at) == pytest.approx(radius, abs=1e-3) for arrow in surface.arrows)
+        assert surface.gain == pytest.approx(2 * math.pi * 0.7, rel=1e-3)
+        assert shot.numbers is shots[0].numbers
+    (held,) = shots[2].view.held
+    assert (held.at, held.low, held.high) == (1.0, -1.0, 1.0) and not shots[2].view.surfaces[0].lines
 
 
 def test_a_parameter_that_is_a_function_is_written_in() -> None:
@@ -281,7 +296,7 @@ def test_a_section_goes_through_the_middle_of_the_whole_range() -> None:
     world = World()
     program = "def tetra(c) integral ([0, 1], [0, 1 - x], [0, 1 - x - y]) [x < c] d(x, y, z)"
     view = IntegralScene(world, world.put("tetra.po", program), "tetra", {}).look({"c": 0.25}, "c").view
-    assert view.held == (("z", 0.5),)
+    assert [(held.name, held.at) for held in view.held] == [("z", 0.5)]
     side = len(view.cells)
     seen = {
         (j / (side - 1), i / (side - 1)) for i, row in enumerate(view.cells) for j, cell in enumerate(row) if cell >= 0

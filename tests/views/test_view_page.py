@@ -28,6 +28,8 @@ def f(t)
 #> f(0.25)
 def disc(r) integral ([-1, 1], [-1, 1]) [x^2 + y^2 < r^2] d(x, y)
 #> disc(0.7)
+def ball(r) integral ([-1, 1], [-1, 1], [-1, 1]) [x^2 + y^2 + z^2 < r^2] d(x, y, z)
+#> ball(0.7)
 def nested(t) sum i in 2..3 (sum j in i..5 (integral [0, 1] [x < t/(i*j)] d(x)))
 def plain(t) t
 def seen(c, shade) integral [0, 1] [x < c]*shade(x) d(x)
@@ -68,7 +70,8 @@ def asked(address: str, path: str, body: Any, host: str = "") -> Any:
 
 
 def test_a_slider_moves_the_numbers(address: str) -> None:
-    assert asked(address, "/names", {}) == {"names": ["f", "disc", "nested", "plain", "seen", "ramp"], "chosen": "f"}
+    names = ["f", "disc", "ball", "nested", "plain", "seen", "ramp"]
+    assert asked(address, "/names", {}) == {"names": names, "chosen": "f"}
     found = asked(address, "/open", {"name": "f"})
     assert (found["values"], found["wrt"], found["integrals"]) == ({"t": 0.25}, "t", 1)
     for t, e_to_t in ((0.25, 1.2840254166877414), (0.75, 2.117000016612675)):
@@ -194,6 +197,11 @@ def test_a_person_with_a_browser(address: str, tmp_path: Path) -> None:
     assert seen["pinned"][0] == seen["withGhost"][0]
     assert seen["compared"][0].startswith("Δ −") and len(seen["compared"]) == 5
     assert seen["ground"] == "rgb(30, 30, 30)"
+    assert seen["section"] == ["z", "0", "-1", "1"]  # where nobody has moved it, in the middle
+    z = seen["sectionThen"]
+    assert 0.2 < z < 0.6 and f"section at z = {z:.4g}" in seen["sectioned"]
+    assert seen["sectionNumbers"][0] == seen["sectionNumbers"][1]
+    assert seen["unsectioned"] == 0
     assert seen["inner"] == ["2", "2"] and seen["innerThen"] == ["3", "3"]
     assert float(seen["summand"][1].split()[0]) == pytest.approx(1 / 9, rel=1e-9)  # of t/(i*j) by t, with i = j = 3
     assert seen["shade"] == "ramp" and float(seen["shaded"][0].split()[0]) == pytest.approx(0.125, rel=1e-9)

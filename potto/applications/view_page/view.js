@@ -19,7 +19,7 @@ async function ask(path, body) {
   return new Promise((resolve) => waiting.set(id, resolve));
 }
 
-let state = { name: "", values: {}, functions: {}, fits: {}, indices: {}, wrt: "", which: 0, integrals: 1 };
+let state = { name: "", values: {}, sections: {}, functions: {}, fits: {}, indices: {}, wrt: "", which: 0, integrals: 1 };
 let lit = "";
 let last = null; // the newest answer
 let pinned = null;
@@ -46,8 +46,8 @@ async function look() {
   const quick = dragged;
   const opening = begun;
   const since = performance.now();
-  const { name, values, functions, wrt, which } = state;
-  const body = { name, values: { ...values }, functions, wrt, which, dark: dark(), nodes: $("nodes").checked };
+  const { name, values, sections, functions, wrt, which } = state;
+  const body = { name, values: { ...values }, sections: { ...sections }, functions, wrt, which, dark: dark(), nodes: $("nodes").checked };
   if ($("ghost").checked) body.ghost = Math.max(1e-9, +$("step").value * Math.max(1, Math.abs(values[wrt] ?? 0)));
   try {
     const found = await ask("/look", { ...body, quick });
@@ -57,7 +57,9 @@ async function look() {
         const kept = !found.numbers && last?.body.name === name && last.wrt === wrt && last.body.which === which;
         last = { ...found, ...(kept && { told: last.told, numbers: last.numbers, old: true }), title: titleOf(name, { ...body.values, ...functions }), wrt, body };
         show($("now"), last, pinned);
-        stand(found.indices, body.values);
+        state.indices = found.indices;
+        stand(found.indices, state.values, body.values, 0);
+        cut(found.sections, body.sections);
         tell(found, performance.now() - since);
       }
     }
@@ -162,7 +164,7 @@ async function open(name, keep = false, which = 0, functions = keep && name === 
   const same = keep && name === state.name && Object.keys(found.values).join() === Object.keys(state.values).join();
   state = {
     name, integrals: found.integrals, which: Math.min(same ? state.which : which, found.integrals - 1),
-    values: same ? state.values : found.values, functions: found.functions, fits: found.fits, indices: found.indices, wrt: same ? state.wrt : found.wrt,
+    values: same ? state.values : found.values, sections: same ? state.sections : found.sections, functions: found.functions, fits: found.fits, indices: found.indices, wrt: same ? state.wrt : found.wrt,
   };
   $("name").value = name;
   fill($("wrt"), Object.keys(state.values).filter((n) => !(n in state.indices)).map((n) => [n, n]), state.wrt);
@@ -181,19 +183,23 @@ function sliders() {
   $("sliders").replaceChildren(...Object.entries(state.values).map(([name, value]) => {
     const reach = Math.max(1, Math.abs(value)), index = state.indices[name];
     const [min, max, step] = index ? [index[1], index[2], 1] : [value - reach, value + reach, reach / 500];
-    const slider = make("input", { type: "range", min, max, step, value, name });
-    const told = make("output", { textContent: String(+value.toPrecision(6)) });
-    slider.dataset.parameter = name;
-    slider.oninput = () => {
-      state.values[name] = +slider.value;
-      told.textContent = String(+(+slider.value).toPrecision(6));
-      dragged = true;
-      look();
-    };
-    const label = make("label", {}, make("span", { className: "name", textContent: name }), slider, told);
+    const label = slides(name, { min, max, step, value }, state.values);
     label.dataset.name = name;
     return label;
   }), ...Object.entries(state.functions).map(([name, text]) => offers(name, text)));
+}
+/** A slider that moves one of `values`. */
+function slides(name, range, values) {
+  const slider = make("input", { type: "range", ...range, name });
+  const told = make("output", { textContent: String(+range.value.toPrecision(6)) });
+  slider.dataset.parameter = name;
+  slider.oninput = () => {
+    values[name] = +slider.value;
+    told.textContent = String(+(+slider.value).toPrecision(6));
+    dragged = true;
+    look();
+  };
+  return make("label", {}, make("span", { className: "name", textContent: name }), slider, told);
 }
 /** A parameter that is a function is given one that fits, or any expression. */
 function offers(name, text) {
@@ -204,16 +210,31 @@ function offers(name, text) {
   field.onchange = () => void open(state.name, true, 0, { ...state.functions, [name]: field.value });
   return make("label", {}, make("span", { className: "name", textContent: name }), field, list);
 }
-/** Indices stand on their numbers, which other values may have changed; but for one that was dragged on meanwhile. */
-function stand(indices, asked) {
-  state.indices = indices;
-  for (const [name, [at, min, max]] of Object.entries(indices)) {
+/** Sliders stand within ranges that other values may have changed; but for one that was dragged on meanwhile. */
+function stand(standing, values, asked, parts) {
+  for (const [name, [at, min, max]] of Object.entries(standing)) {
     const slider = document.querySelector(`#sliders input[data-parameter="${CSS.escape(name)}"]`);
-    if (!slider || state.values[name] !== asked[name]) continue;
-    state.values[name] = at;
-    Object.assign(slider, { min, max, value: at });
-    slider.nextElementSibling.textContent = String(at);
+    if (!slider || values[name] !== asked[name]) continue;
+    if (name in values) values[name] = at;
+    Object.assign(slider, { min, max, step: parts ? (max - min) / parts || "any" : 1, value: at });
+    slider.nextElementSibling.textContent = String(+at.toPrecision(6));
   }
+}
+/** A section has a slider for each variable that is not seen. One that nobody has moved stays in the middle. */
+function cut(sections, asked) {
+  const names = Object.keys(sections), before = [...document.querySelectorAll("#sliders .section")];
+  if (before.map((label) => label.dataset.section).join() !== names.join()) {
+    for (const label of before) label.remove();
+    $("sliders").append(...names.map((name) => {
+      const [value, min, max] = sections[name];
+      const label = slides(name, { min, max, value }, state.sections);
+      label.className = "section";
+      label.title = "where the section stands";
+      label.dataset.section = name;
+      return label;
+    }));
+  }
+  stand(sections, state.sections, asked, 500);
 }
 const moves = () => { for (const label of $("sliders").children) label.classList.toggle("moves", label.dataset.name === state.wrt); };
 
