@@ -48,19 +48,19 @@ def outcomes_of(world: World, file: str) -> list[Outcome]:
 
 
 def _outcome(world: World, file: str, line: int, text: str, expected: str | None) -> Outcome:
-    value = None
+    value, shown = None, " ".join(text.split())
     try:
         estimate = world.evaluate(file, text).estimate
         value = format_answer(estimate)
         if expected is None:
-            return Outcome(file, line, text, expected, value, True)
+            return Outcome(file, line, shown, expected, value, True)
         wanted = world.evaluate(file, expected).estimate
         good = agrees(estimate, wanted, world.parse(expected))
     except ProgramError as error:
         message = "; ".join(diagnostic.message for diagnostic in error.diagnostics)
-        return Outcome(file, line, text, expected, value, False, message)
+        return Outcome(file, line, shown, expected, value, False, message)
     message = "" if good else f"expected {expected}, got {interval(estimate)}"
-    return Outcome(file, line, text, expected, value, good, message)
+    return Outcome(file, line, shown, expected, value, good, message)
 
 
 def agrees(estimate: Estimate, wanted: Estimate, written: nodes.Expr) -> bool:

@@ -4,7 +4,7 @@ Owns the grammar, chunks, parsing with repair, printing and formatting. Knows no
 of lark.
 """
 
-from potto.syntax.chunks import Chunk, pieces, split
+from potto.syntax.chunks import Chunk, goes_on, pieces, split
 from potto.syntax.dump import dump_tree
 from potto.syntax.formatter import format_source
 from potto.syntax.live import Live, live_expressions
@@ -28,6 +28,7 @@ __all__ = [
     "dump_tree",
     "extent",
     "format_source",
+    "goes_on",
     "live_expressions",
     "node_at",
     "parse_chunk",

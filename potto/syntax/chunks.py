@@ -1,11 +1,11 @@
 """A file cut into chunks: one for each top-level definition or statement.
 
-Owns `Chunk`, `split` and `pieces`. A chunk starts at each line with code in its first column, also while a bracket is
-open that nothing closes before the next definition: so that a stray bracket can't swallow it. Some things go with the
-chunk above or below: a line that starts with a closing bracket, which can start nothing, the lines within brackets that
-are closed, and the body of a `let` whose `in` ends the line before belong to the chunk above them; comment lines
-directly above a definition belong to the definition. Other comments in the first column are chunks of their own, unless
-an indented line follows.
+Owns `Chunk`, `split`, `pieces` and `goes_on`. A chunk starts at each line with code in its first column, also while a
+bracket is open that nothing closes before the next definition: so that a stray bracket can't swallow it. Some things go
+with the chunk above or below: a line that starts with a closing bracket, which can start nothing, the lines within
+brackets that are closed, the operand of an operator that ends the line before, and the body of a `let` whose `in`
+does so, belong to the chunk above them; comment lines directly above a definition belong to it. Other comments in
+the first column are chunks of their own, unless an indented line follows.
 
 A piece is some neighbouring chunks. It begins where one begins whatever stands above it, at a definition, so that each
 can be split by itself: after an edit all but one are what they were.
@@ -18,7 +18,7 @@ from collections.abc import Sequence
 
 from msgspec import Struct
 
-from potto.syntax.tokens import FIRST_NAME, normalized
+from potto.syntax.tokens import FIRST_NAME, awaits_operand, normalized
 
 _LINE = re.compile(r"\n(?:#.*\n)*\f*([^\s])")
 """A line with code or a comment in its first column, and the comment lines directly above it. It begins with the end of
@@ -26,9 +26,10 @@ the line before, so that blank and indented lines are passed over as fast as mem
 _BRACKETS = re.compile(r"""[(\[]|[)\]]|"[^"\n]*"?|\#[^\n]*|\n""")
 _ITEM = re.compile(
     rf"(?:def|diffeo|from|import|for|print)\b|record[ \t]+{FIRST_NAME.pattern}[ \t]*\("
-    rf"|{FIRST_NAME.pattern}[ \t]*=(?!=)"
+    rf"|{FIRST_NAME.pattern}[ \t]*(?::[^=\n?]*)?=(?!=)"
 )
 """The start of a line in the first column that is not part of an expression."""
+_BLOCK = re.compile(r"(?:#[^\n]*\n)*(?:def|diffeo|for)\b")
 _LET, _IN = re.compile(r"\blet\b"), re.compile(r"(?<![\w.])in\Z")
 _INDENTED = re.compile(r"\n[^\S\n]+[^\s]")
 _PIECE = re.compile(rf"\n((?:#.*\n)*)(?={_ITEM.pattern})")
@@ -139,19 +140,40 @@ def _passed(text: str, end: int, start: int, starts: list[int], comments: list[i
     return []
 
 
-def _is_body(text: str, chunk: int, end: int, line: int) -> bool:
-    """Whether a line in the first column is the body of a `let` in the chunk above it, whose last code ends at `in`."""
+def _last_code(text: str, chunk: int, end: int) -> tuple[int, int]:
+    """Where the last line of code of a chunk that ends at a place begins, and where its code ends."""
     while True:
         while end > chunk and text[end - 1].isspace():
             end -= 1
         begin = text.rfind("\n", chunk, end) + 1
         comment = text.find("#", begin, end)
         if comment < 0 or end <= chunk:
-            break
+            return begin, end
         end = comment
-    if not text.endswith("in", begin, end) or _IN.search(text, begin, end) is None:
+
+
+def _is_body(text: str, chunk: int, end: int) -> bool:
+    """Whether the body of a `let` of a chunk is still to come that ends at a place: at its `in`."""
+    return _IN.search(text, max(chunk, end - 3), end) is not None and _LET.search(text, chunk, end) is not None
+
+
+def _awaits_operand(text: str, chunk: int, begin: int, end: int) -> bool:
+    """Whether the line of code from `begin` to `end` ends with an operator, and is no line of a block."""
+    in_block = text[begin].isspace() and _BLOCK.match(text, chunk + (text[chunk] == "\n")) is not None
+    return not in_block and awaits_operand(text, chunk, end)
+
+
+def goes_on(text: str, line: str) -> bool:
+    """Whether a line in the first column goes on with the one chunk above it, where what comes below is not known yet:
+    it does while a bracket is open."""
+    if _ITEM.match(line):
         return False
-    return _LET.search(text, chunk, end) is not None and _ITEM.match(text, line) is None
+    text = normalized(text)
+    begin, end = _last_code(text, 0, len(text))
+    if begin < end and (_awaits_operand(text, 0, begin, end) or _is_body(text, 0, end)):
+        return True
+    words = [found.group() for found in _BRACKETS.finditer(text)]
+    return words.count("(") + words.count("[") > words.count(")") + words.count("]")
 
 
 class _Lookahead:
@@ -165,9 +187,11 @@ class _Lookahead:
 
     def goes_on(self, start: int, end: int, line: int) -> int:
         """Up to where goes on what a chunk has begun that ends above a line; 0 if that is complete, as mostly."""
-        above = self.text[start:line]
-        if self.lets and "let" in above and _is_body(self.text, start, end, line):
+        begin, last = _last_code(self.text, start, end)
+        unfinished = _awaits_operand(self.text, start, begin, last) or (self.lets and _is_body(self.text, start, last))
+        if unfinished and _ITEM.match(self.text, line) is None:
             return line
+        above = self.text[start:line]
         if above.count("(") + above.count("[") <= above.count(")") + above.count("]"):
             return 0
         if line >= self.seen:

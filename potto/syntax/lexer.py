@@ -355,7 +355,7 @@ class _Lexer:
         """Whether a line that stands where a statement could start can only continue the one before."""
         if _CONTINUES.match(self.text, position):
             return True
-        if self.indent and self._ends_with_operator():  # its operand is still to come, and a binding is none
+        if self._ends_with_operator():  # its operand is still to come, and a binding is none
             return _BINDING.match(self.text, position) is None and _CLAUSE.match(self.text, position) is None
         if self.tokens[-1].start == self.let_in:  # its body is still to come, and a binding is none
             return _BINDING.match(self.text, position) is None

@@ -1,6 +1,6 @@
 """The words of the language: token kinds, keywords and the one pattern that cuts text into them.
 
-Owns `Token`, `Comment` and the tables of words. Knows no layout: that is `lexer`.
+Owns `Token`, `Comment` and the tables of words, and tells which words end no line. Knows no layout: that is `lexer`.
 """
 
 from __future__ import annotations
@@ -117,8 +117,17 @@ MASTER = re.compile(
     re.VERBOSE,
 )
 
+_AWAITS = re.compile(r"(?:[+\-−*/^?<≤≥≠]|(?<!-)>|[=!<>]=|(?<![\w.])(?:and|or|not)|(?P<colon>:))\Z")
+
 FIRST_NAME = re.compile(_NAME)
 NUMBER_PREFIX = re.compile(r"[0-9]+(?:\.[0-9]+)?(?:[eE][+-]?[0-9]+)?")
+
+
+def awaits_operand(code: str, start: int, end: int) -> bool:
+    """Whether code from `start` to `end`, where no comment stands, ends with an operator: an operand is to come.
+    The `:` of `p ? a : b` is one, that of a loop or a type is not."""
+    found = _AWAITS.search(code, max(start, end - 4), end)
+    return found is not None and (found["colon"] is None or code.find("?", start, end) >= 0)
 
 
 def normalized(text: str) -> str:

@@ -12,6 +12,7 @@ import re
 from collections.abc import Iterable, Iterator
 from typing import TextIO
 
+from potto.syntax import goes_on
 from potto_repl.backslash_symbols import readable
 from potto_repl.paint import Screen, painted
 from potto_repl.reply import Part
@@ -23,7 +24,8 @@ _ALONE = re.compile(r":|\S+\?{1,2}\s*$")
 
 
 def entries(lines: Iterable[str]) -> Iterator[str]:
-    """Lines as entries, as soon as each is over: a command is a line; a line in the first column starts a new one.
+    """Lines as entries, as soon as each is over: a command is a line; a line in the first column starts a new one,
+    unless the one above it ends with an operator or leaves a bracket open.
 
     Comments above a definition belong to it, and so do the indented lines below.
     """
@@ -31,10 +33,11 @@ def entries(lines: Iterable[str]) -> Iterator[str]:
     for raw in lines:
         line = raw.rstrip("\r\n")
         starts = bool(line) and not line[0].isspace() and line[0] not in ")]"
-        if starts and pending and not _only_comments(pending):
+        alone = starts and _ALONE.match(line) is not None
+        if starts and pending and not _only_comments(pending) and (alone or not goes_on(_joined(pending), line)):
             yield _joined(pending)
             pending = []
-        if _ALONE.match(line) and not line[:1].isspace():
+        if alone:
             yield line
         elif line.strip() or pending:
             pending.append(line)

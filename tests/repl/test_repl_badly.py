@@ -171,6 +171,11 @@ def test_two_thousand_lines_at_once(talk):
     assert "`y` is not defined" in text and "<In 3>:999:7" in text
 
 
+def test_entries_of_a_pipe_go_on_behind_operators_and_within_brackets():
+    lines = ["1 +", "2", "f(", "1,", "2)", "3 *", ":type 4", "f(", "def f(x) x", "a = 1 -", "b = 2"]
+    assert list(entries(lines)) == ["1 +\n2", "f(\n1,\n2)", "3 *", ":type 4", "f(", "def f(x) x", "a = 1 -", "b = 2"]
+
+
 def test_names_of_builtins_may_be_used(talk):
     text = fine(talk("def sqrt(x) 2*x"))
     assert text.count("builtin") == 1 and "shadows the builtin `sqrt`" in text  # said once

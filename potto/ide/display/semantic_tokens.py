@@ -88,20 +88,20 @@ def _coloured(db: Database, chunk: ChunkAt, name: str | None = None) -> list[Wor
 @query(keep=8192)
 def plain_words(db: Database, text: str, diffeo: bool) -> tuple[Word, ...]:
     """The words of a chunk that are not names; a live expression in its comments is coloured as code."""
-    live = [found.text_span for found in live_expressions(text)] if "#>" in text else []
+    live = live_expressions(text) if "#>" in text else ()
     found: list[Word] = []
     for token in tokenize(text, diffeo):
         if token.kind != "COMMENT":
             found += _word(token.kind, token.text, token.start)
-            continue
-        inside = next((s for s in live if token.start <= s.start <= token.end), None)
-        if inside is None:
+        elif any(asked.span.start <= token.start < asked.span.end for asked in live):
+            head = len(token.text) - len(token.text[2:].lstrip())
+            found.append((token.start, token.start + head, "comment", ("documentation",)))
+        else:
             found.append((token.start, token.start + len(token.text.rstrip("\r")), "comment", ()))
-            continue
-        found.append((token.start, inside.start, "comment", ("documentation",)))
-        for inner in tokenize(text[inside.start : inside.end]):
-            found += _word(inner.kind, inner.text, inside.start + inner.start)
-    return tuple(found)
+    for asked in live:
+        for inner in tokenize(asked.text):
+            found += _word(inner.kind, inner.text, asked.text_span.start + inner.start)
+    return tuple(sorted(found))
 
 
 def _word(kind: str, text: str, start: int) -> Iterator[Word]:
