@@ -31,7 +31,7 @@ _LARGEST = 64  # monomials; an expansion larger than that becomes an atom
 _HIGHEST = 16  # powers of sums that are expanded
 
 
-_FOUND: Kept[Polynomial] = Kept()
+_FOUND: Kept[Term, Polynomial] = Kept()
 
 
 def normal_form(term: Term) -> Polynomial:

@@ -54,6 +54,7 @@ from potto.core.term_kinds import (
 
 Binder = TypeVar("Binder", bound=Term)
 Found = TypeVar("Found")
+Key = TypeVar("Key")
 
 
 def children(term: Term) -> tuple[Term, ...]:
@@ -200,15 +201,15 @@ def unknown(root: Term, known: Container[Term], below: Callable[[Term], Sequence
     return [node for node in order if node not in known]
 
 
-class Kept(Generic[Found]):
+class Kept(Generic[Key, Found]):
     """What was found out about terms, in a table for as long as it is not too large. Then comes a new one; whoever
     fills the one before goes on with that."""
 
     def __init__(self, most: int = 4096) -> None:
         self.most = most
-        self.found: dict[Term, Found] = {}
+        self.found: dict[Key, Found] = {}
 
-    def table(self) -> dict[Term, Found]:
+    def table(self) -> dict[Key, Found]:
         if len(self.found) > self.most:
             self.found = {}
         return self.found
@@ -225,7 +226,7 @@ class Told(Generic[Found]):
     ) -> None:
         self.tell = tell
         self.below = below
-        self.known: Kept[Found] = Kept(65536)
+        self.known: Kept[Term, Found] = Kept(65536)
 
     def __call__(self, term: Term) -> Found:
         known = self.known.table()

@@ -6,6 +6,7 @@ import textwrap
 
 import pytest
 
+from potto.calculus.explanation import readable, readable_parts
 from potto.calculus.explanation.explain import DerivativeText, describe, explain_derivative
 from potto.calculus.explanation.notation import Notation
 from potto.checking.library import Library
@@ -158,15 +159,52 @@ def test_a_long_formula_gives_way_while_it_is_written() -> None:
         raise Enough
 
     db = Database()
-    db.set_input(("overlay", FILE), "def f(c) exp(c + c^2)\n")
+    db.set_input(("overlay", FILE), "def f(c) exp(c + c^2 + c^7)\n")
     term = core(db, FILE, "f").term
 
     def resolve(target: Global) -> Term:
         return core(db, target.module, target.name).term
 
-    assert describe(term, "f", "", resolve, Notation()).tangent == "(2*c + 1)*exp(c + c^2)*dc"
     with pytest.raises(Enough):
         describe(term, "f", "", resolve, Notation(), pause)
+    assert describe(term, "f", "", resolve, Notation()).tangent == "(2*c + 7*c^6 + 1)*exp(c + c^2 + c^7)*dc"
+
+
+def forget_parts() -> None:
+    for kept in (readable_parts._KNOWN, readable_parts._FACTORS, readable_parts._PRODUCTS, readable_parts._WRITTEN):
+        kept.found = {}
+
+
+def test_a_formula_is_the_same_whatever_was_written_before() -> None:
+    """What is kept of its parts tells a parameter from a variable of integration, and both from a whole number."""
+    body = "cos(pi*k + x)*abs(x)^3*sqrt(x^2*(1 + k^2) + a*x^2)*a"
+    texts = [
+        f"def f(a, x, k) {body}",
+        f"def f(a, k) integral [-1, 1] {body} d(x)",
+        f"def f(a, x) sum k in 1..7 ({body})",
+    ]
+    alone = []
+    for text in texts:
+        forget_parts()
+        alone.append(explain(text, "f").text)
+    assert len(set(alone)) == len(texts)
+    for order in (texts, texts[::-1]):
+        forget_parts()
+        together = {text: explain(text, "f").text for text in order}
+        assert [together[text] for text in texts] == alone
+
+
+def test_after_a_key_the_parts_of_a_formula_are_known(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Ten summands, and one of them is edited."""
+    tried: list[Term] = []
+    shortest = readable._Work._shortest
+    monkeypatch.setattr(readable._Work, "_shortest", lambda self, node: tried.append(node) or shortest(self, node))
+    forget_parts()
+    text = "def f(a, b) " + " + ".join(f"sin(a*{n}.5)*exp(b^{n})" for n in range(2, 12))
+    explain(text, "f")
+    cold = len(tried)
+    explain(text.replace("a*7.5", "a*7.25"), "f")
+    assert cold > 50 and len(tried) - cold < 0.4 * cold
 
 
 def test_a_recursion_in_an_integral_that_has_no_end_is_told() -> None:

@@ -27,7 +27,7 @@ def degree(term: Term, variables: Iterable[str]) -> int | None:
 
 
 @lru_cache(maxsize=64)
-def _known(names: frozenset[str]) -> Kept[int | None]:
+def _known(names: frozenset[str]) -> Kept[Term, int | None]:
     """Degrees in these variables: where another shader stands between surfaces, most parts are what they were."""
     return Kept()
 

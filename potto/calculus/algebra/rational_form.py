@@ -55,7 +55,7 @@ class Rational(Struct, frozen=True):
 
 # By the variable along which sums are taken apart: what terms share is multiplied out once, and what has grown too
 # large is not tried again in every term that contains it.
-_FOUND: dict[str | None, Kept[Rational | None]] = {}
+_FOUND: dict[str | None, Kept[Term, Rational | None]] = {}
 
 
 def normal(term: Term, name: str | None = None) -> Rational | None:

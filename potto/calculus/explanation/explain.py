@@ -28,7 +28,7 @@ from potto.calculus.explanation.fields import fields_of
 from potto.calculus.explanation.layout import DerivativeText, IntegralText, SurfaceText
 from potto.calculus.explanation.notation import Notation, Rewrite, notation_of, written_notation
 from potto.calculus.explanation.plain_names import Each, apart, plainly_indexed, plainly_named
-from potto.calculus.explanation.readable import ReadableParts
+from potto.calculus.explanation.readable_parts import ReadableParts
 from potto.calculus.explanation.symbols import Formula, NoFormula, Words, over_functions, shorter
 from potto.calculus.inlining.expand import Resolve, heads_of
 from potto.calculus.solving.pivots import NoClosedForm, Roots, SurfaceRoot, pivots

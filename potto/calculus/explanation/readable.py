@@ -12,8 +12,6 @@ from collections.abc import Callable, Iterator
 from fractions import Fraction
 from math import inf, isfinite
 
-from msgspec import Struct
-
 from potto.calculus.algebra.ranges import Box, range_of
 from potto.calculus.algebra.rational_form import Rational, normal
 from potto.calculus.explanation.alike import alike, content
@@ -30,6 +28,7 @@ from potto.calculus.explanation.in_front import hides_index, in_front
 from potto.calculus.explanation.named_sums import put_back, with_sums_named
 from potto.calculus.explanation.oriented import either_way
 from potto.calculus.explanation.products import added, in_order, is_negative, led_by, with_one_root, written
+from potto.calculus.explanation.readable_parts import Part, ReadableParts
 from potto.calculus.explanation.signs import of_two, sign_of_product, size_of_product, sums_of_signs
 from potto.calculus.explanation.squares import root_of_square, squares_in
 from potto.core.numerals import Numbers
@@ -75,18 +74,6 @@ _MANY = 60  # nodes of what is expanded
 _SUMMANDS = 24
 _SIGNS_OF_A_SUM = 12  # characters that say no more than over what is summed
 _TANGENT = 4  # how much longer a formula seems for each tangent that it names
-
-
-class ReadableParts(Struct):
-    """Of formulas that are written one after the other. known: what was found for a part of one, by all that this
-    depends on; factors: of atoms; products: that sums are; written: products of powers, by these and the tangents;
-    pause: called before each new part, may raise what ends it."""
-
-    pause: Callable[[], None] = lambda: None
-    known: dict[tuple[Term, frozenset[str], frozenset[str]], Term] = {}
-    factors: dict[Term, Factors] = {}
-    products: dict[tuple[Term, frozenset[str], frozenset[str]], Factors | None] = {}
-    written: dict[tuple[Fraction, tuple[tuple[Monomial, int], ...], frozenset[str]], Term] = {}
 
 
 def readable(
@@ -276,9 +263,9 @@ class _Work:
             known[key] = taken_out(base.args, self._factored, self.node, self.tangents)
         return known[key]
 
-    def _key(self, node: Term) -> tuple[Term, frozenset[str], frozenset[str]]:
+    def _key(self, node: Term) -> Part:
         """All that the way to write a part depends on: what is bound in it is among the variables of any formula."""
-        return node, self.tangents, self.inside & node.free
+        return node, self.tangents, self.inside & node.free, self.integers & node.free
 
     def _choices(self, node: Prim) -> Iterator[Term]:
         """Sums by the sides of a choice in them, which leave a product where one side comes to 0."""

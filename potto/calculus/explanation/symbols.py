@@ -18,7 +18,8 @@ from potto.calculus.explanation.bound_names import as_written, named_alike
 from potto.calculus.explanation.decimals import in_decimals
 from potto.calculus.explanation.guarded import guarded
 from potto.calculus.explanation.notation import Notation
-from potto.calculus.explanation.readable import ReadableParts, readable
+from potto.calculus.explanation.readable import readable
+from potto.calculus.explanation.readable_parts import ReadableParts
 from potto.calculus.surfaces.trace import spine
 from potto.core.printer import LEFT_OUT
 from potto.core.simplify import simplify
