@@ -199,7 +199,9 @@ TOO_MANY_ROOTS = Shortfall(
 ROOTS_NOT_SEPARATED = replace(
     TOO_MANY_ROOTS, message="a condition without a closed form has too many roots, or roots too close together"
 )
-BOUNDLESS = Shortfall("the derivative is infinite: there is a surface that moves infinitely fast", BESIDE)
+AT_A_SADDLE = Shortfall(
+    "the derivative is infinite: a condition's level set has a saddle, or another critical point, just here", BESIDE
+)
 LATE = Shortfall("it takes longer than others that are evaluated with it")
 UNSEEN_MEETING = Shortfall("surfaces meet, or lie on a bound, that an inner integral jumps at", JOIN)
 UNCOUNTED_JUMP = Shortfall("a condition jumps inside an inner integral where its boundary term is not counted", JOIN)

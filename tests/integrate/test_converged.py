@@ -37,6 +37,8 @@ BOUNDLESS = [  # where, value, derivative
     ("integral ([-1, 1], [-1, 2]) (if [x*y - t < 0] then 1 else 0) d(x, y)", 0.0, 3.0, INF),
     ("integral ([-1, 1], [-1, 1]) [(x - 0.1)*(y - 0.2) < t] d(x, y)", 0.0, 1.1 * 0.8 + 0.9 * 1.2, INF),
     ("integral ([-1, 1], [-1, 1]) [x^2 - y^2 < t] d(x, y)", 0.0, 2.0, INF),
+    ("integral ([0, 2], [0, 2]) [x^3 + y^3 - 3*x*y < t] d(x, y)", 0.0, 1.5, INF),
+    ("integral ([-1, 1], [-1, 1]) [x^3 - 3*x*y^2 > t] d(x, y)", 0.0, 2.0, -INF),
     ("integral [-1, 1] [x^3 < t] d(x)", 0.0, 1.0, INF),
     ("integral [-1, 1] (integral [-1, 1] [x*y < t] d(y)) d(x)", 0.0, 2.0, INF),
 ]

@@ -16,7 +16,8 @@ from typing import Any
 import numpy as np
 
 from potto.integrate.adaptive.reynolds import Totals
-from potto.integrate.events import BOUNDLESS
+from potto.integrate.adaptive.saddles import beside_saddles
+from potto.integrate.events import AT_A_SADDLE, BOUNDLESS
 from potto.integrate.panels.iterated import siblings
 from potto.integrate.panels.panel_batch import PanelBatch
 from potto.integrate.pieces import Pieces, Sums
@@ -102,6 +103,12 @@ def endless(work: PanelBatch, found: Totals) -> Array | None:
         for d, sign in enumerate(_without_end(work, index, upper)):
             goes[0, d, work.seg.owner[index[sign > 0]]] = True
             goes[1, d, work.seg.owner[index[sign < 0]]] = True
+    rest = np.nonzero((rough.any(axis=0) & ~goes.any(axis=0)).any(axis=0))[0]
+    if rest.size:
+        saddles = beside_saddles(work, rest)
+        goes |= np.stack((saddles > 0, saddles < 0))
+        if saddles.any():
+            work.machine.note(AT_A_SADDLE, work.below(np.nonzero(saddles.any(axis=0))[0]))
     up, down = goes & rough.any(axis=0)
     if not goes.any():
         return None
