@@ -255,3 +255,41 @@ def test_what_is_elsewhere_than_where_all_conditions_hold_counts(condition: str)
     assert abs(answer.value - (part**6 + all_of_it**6) / 2) <= answer.error <= 1e-3
     slope = 3 * part**5 * (1 - below) * (1 if "max" in condition else -1)
     assert abs(answer.tangent - slope) <= answer.tangent_error <= 0.01
+
+
+def _walked(density: str, steps: int, inside: bool) -> str:
+    """The chance that the sums of some steps are ever (or never) above t times their number, t each."""
+    names = NAMES[:steps]
+    sums = [" + ".join(names[: k + 1]) for k in range(steps)]
+    barrier = [f"[{s} {'<=' if inside else '>'} {k + 1}*t]" for k, s in enumerate(sums)]
+    given = ", ".join(f"{name} ~ {density}" for name in names)
+    body = "*".join(barrier) if inside else f"max({', '.join(barrier)})"
+    return f"def f(t) integral ({given}) {body} d({', '.join(names)})"
+
+
+def test_a_union_of_half_spaces_is_eliminated_as_its_disjoint_parts() -> None:
+    """Of three exponential steps over a barrier. Below it a <= t, b <= 2t - a, c <= 3t - a - b; from there
+    int exp(-a - b) (1 - exp(a + b - 3t)) db da is 1 - exp(-t) - t*exp(-2*t) - 3*t^2/2*exp(-3*t)."""
+    answer = potto.grad(potto.compile(_walked("exponential(1)", 3, False)).f, "t")(1.5)
+    t = mp.mpf(1.5)
+    once, twice, thrice = (mp.exp(-k * t) for k in (1, 2, 3))
+    ever = once + t * twice + 3 * t**2 / 2 * thrice
+    slope = -once + (1 - 2 * t) * twice + (3 * t - 9 * t**2 / 2) * thrice
+    assert abs(answer.value - ever) <= answer.error <= 1e-11
+    assert abs(answer.tangent - slope) <= answer.tangent_error <= 1e-10 and answer.evals <= 100_000
+
+
+@pytest.mark.parametrize("steps", [3, 4])
+def test_ever_above_and_never_above_add_up(steps: int) -> None:
+    """Of normal steps, where a step's table is large only beyond what the step before passes on."""
+    ever, never = (potto.compile(_walked("normal(0, 1)", steps, inside)).f(1.5) for inside in (False, True))
+    assert ever.converged and never.converged and ever.evals <= 2_000_000
+    assert abs(ever.value + never.value - 1) <= ever.error + never.error <= 1e-10
+
+
+def test_what_matters_of_ranges_that_one_exponent_holds_together() -> None:
+    """exp(-a - b - c) bounds no variable while the others may be anything; between their bounds it does."""
+    body = "exp(-a - b - c)*[a + b + c > 3*t]"
+    found = potto.compile(program(["[0, inf]"] * 3, body)).f(1.5)
+    true = mp.exp(-4.5) * (1 + 4.5 + mp.mpf(4.5) ** 2 / 2)  # a gamma(3) number above 3t
+    assert abs(found.value - true) <= found.error <= 1e-11 and found.evals <= 60_000

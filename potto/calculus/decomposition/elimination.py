@@ -20,7 +20,8 @@ from functools import lru_cache, partial, reduce
 from msgspec import Struct
 
 from potto.calculus.decomposition.distributions import density_at, distributed
-from potto.calculus.decomposition.factors import Names, factors, summands
+from potto.calculus.decomposition.factors import Names, alternatives, factors, summands
+from potto.calculus.surfaces.case_split import by_extremes
 from potto.core.collecting import split
 from potto.core.polynomials import number
 from potto.core.terms import (
@@ -119,12 +120,14 @@ def _chain(term: Integral, state: str | None, known: tuple[Distribution, ...]) -
 
 @lru_cache(maxsize=1024)
 def eliminable(term: Integral) -> tuple[Integral, ...]:
-    """Integrals that have steps and whose sum is this one: itself, else those of the summands of a factor; or none."""
+    """Integrals that have steps and whose sum is this one: itself, else those of the summands of a factor, or of what a
+    condition in it chooses from; or none."""
     if eliminate(term) is not None:
         return (term,)
+    term = by_extremes(term)
     every, names = list(factors(term.body)), frozenset(term.variables)
     for place, factor in enumerate(every):
-        parts = summands(factor, names)
+        parts = [part for summand in summands(factor, names) for part in alternatives(summand)]
         if 1 < len(parts) <= MOST_SUMMANDS:
             bodies = (mul(*every[:place], part, *every[place + 1 :]) for part in parts)
             split = tuple(integral(term.variables, term.bounds, body, term.hints) for body in bodies)

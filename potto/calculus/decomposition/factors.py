@@ -1,7 +1,7 @@
 """What a term is a product of, and what it is a sum of.
 
-Owns `factors` and `summands`. A condition with a maximum or a minimum that holds where several others do is their
-product, and so is a conditional without an other case.
+Owns `factors`, `summands` and `alternatives`. A condition with a maximum or a minimum that holds where several
+others do is their product, and so is a conditional without an other case.
 """
 
 from __future__ import annotations
@@ -85,6 +85,17 @@ def summands(term: Term, names: Names) -> list[Term]:
             case _:
                 found.append(reduce(lambda part, wrap: wrap(part), scaled, item))
     return found
+
+
+def alternatives(term: Term) -> list[Term]:
+    """What a conditional is a sum of: what it is on either side of its condition, and so on within. Each part vanishes
+    where the others do not, so that nothing cancels. Greatests and leasts in conditions are for `by_extremes`."""
+    if not isinstance(term, Branch) or {term.then, term.orelse} == {ZERO, ONE}:
+        return [term]
+    holds = branch(term.coordinates, term.strict, ONE, ZERO)
+    fails = branch(term.coordinates, term.strict, ZERO, ONE)
+    sides = ((holds, term.then), (fails, term.orelse))
+    return [mul(side, part) for side, value in sides if value is not ZERO for part in alternatives(value)]
 
 
 def _over(below: Term, above: Term) -> Term:

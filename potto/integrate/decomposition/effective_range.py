@@ -102,12 +102,14 @@ def _alike(plan: Plan, env: dict[str, Value], owner: Ints, low: Array, high: Arr
 
 
 def _box(plan: Plan, env: dict[str, Value], batch: int) -> dict[str, Interval]:
-    """The environment as intervals, a row for each member."""
+    """The environment as intervals, a row for each member, and variables further in between their bounds."""
     box: dict[str, Interval] = {node.name: ANYTHING for node in postorder(plan.mass) if isinstance(node, Var)}
     for name, value in env.items():
         if isinstance(value, Cell):
             column = as_array(value.v, batch)[:, None]
             box[name] = column, column
+    for level in (each.level for each in plan.levels if each.level.variable not in env):
+        box[level.variable] = _enclosed(level, box)
     return box
 
 
@@ -248,8 +250,10 @@ def _parts(start: Array, end: Array) -> Array:
 
 
 def _first(held: Array, most: Array) -> tuple[Any, Array]:
-    """From which shell on all of them together hold next to nothing of the most that one holds, and what they do."""
+    """From which shell on all of them together hold next to nothing of the most that one holds, and what they do;
+    behind the last one where that is not known."""
     left = np.cumsum(held[:, ::-1], axis=1)[:, ::-1]
     left = np.concatenate((left, np.zeros((held.shape[0], 1))), axis=1)
-    at = np.argmax(left <= (NOTHING * most)[:, None], axis=1)
+    little = left <= (NOTHING * most)[:, None]
+    at = np.where(little.any(axis=1), np.argmax(little, axis=1), held.shape[1])
     return at, left[np.arange(held.shape[0]), at]

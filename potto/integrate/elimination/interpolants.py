@@ -43,7 +43,7 @@ class InterpolantTable(Struct, frozen=True):
     Legendre polynomials: of V, then of V's derivatives by the parameters where s moves along with its segment's ends,
     and last of dV/du. error: (2 + k, P) of the same, in the mean over the piece: there an interpolant through Gauss
     nodes is off by no more than the values that it goes through, since the rule is exact for its square. largest: of
-    |V|. met: the largest that was asked for.
+    |V|. met: the largest that was asked for, the least s, and the greatest.
     """
 
     segments: Segments
@@ -55,12 +55,26 @@ class InterpolantTable(Struct, frozen=True):
     coefficients: Array
     error: Array
     largest: float = 0.0
-    met: Array = field(default_factory=lambda: np.zeros(1))
+    met: Array = field(default_factory=lambda: np.array((0.0, np.inf, -np.inf)))
 
     @property
     def seen(self) -> bool:
-        """Whether anyone has asked for V where it is large: if not, a peak may have been missed."""
-        return bool(self.met[0] >= SEEN * self.largest)
+        """Whether anyone has asked for V where it is large between the least s and the greatest that were asked for: if
+        not, a peak may have been missed. What lies beyond them hardly weighs."""
+        most, least, greatest = self.met
+        if most >= SEEN * self.largest:
+            return True
+        x, _, v = self.at_nodes
+        return bool(most >= SEEN * np.abs(v).max(initial=0.0, where=(least <= x) & (x <= greatest)))
+
+    @property
+    def at_nodes(self) -> tuple[Array, Array, Array]:
+        """The Gauss nodes of all pieces, dx/du, and V: (P, n) each."""
+        rule = gauss(ORDER)
+        back = np.polynomial.legendre.legvander(2 * rule.nodes - 1, ORDER - 1)
+        u = self.u0[:, None] + (self.u1 - self.u0)[:, None] * rule.nodes
+        x, slope, _ = substitution.points(self.segments.pick(self.segment), u)
+        return x, slope, self.coefficients[0] @ back.T
 
     def at(self, s: Cell, k: int, wide: int) -> Cell:
         """V at numbers that move in `wide` directions, the first k of which are those of the parameters; 0 beyond the
@@ -77,7 +91,12 @@ class InterpolantTable(Struct, frozen=True):
         values = np.einsum("ni,cni->cn", p, self.coefficients[:, piece]) * within
         errors = self.error[:, piece] * within
         v, e = values[0].reshape(shape), errors[0].reshape(shape)
-        self.met[0] = max(self.met[0], np.abs(v).max(initial=0.0))
+        most, least, greatest = self.met
+        self.met[:] = (
+            np.abs(v).max(initial=most),
+            np.fmin.reduce(x, initial=least),
+            np.fmax.reduce(x, initial=greatest),
+        )
         if not wide:
             return Cell(v, e)
         label = substitution.label(seg, x[:, None])
@@ -137,13 +156,11 @@ def tabulated(
 
 def concentration(tables: Sequence[InterpolantTable]) -> tuple[float, float]:
     """The mean and the deviation of a number of whose density some tables are the sum."""
-    rule = gauss(ORDER)
-    back = np.polynomial.legendre.legvander(2 * rule.nodes - 1, ORDER - 1)
+    weights = gauss(ORDER).weights
     moments = np.zeros(3)
     for table in tables:
-        u = table.u0[:, None] + (table.u1 - table.u0)[:, None] * rule.nodes
-        x, slope, _ = substitution.points(table.segments.pick(table.segment), u)
-        mass = np.abs(table.coefficients[0] @ back.T) * rule.weights * slope * (table.u1 - table.u0)[:, None]
+        x, slope, v = table.at_nodes
+        mass = np.abs(v) * weights * slope * (table.u1 - table.u0)[:, None]
         moments += [(mass * x**power).sum() for power in range(3)]
     if not moments[0] > 0:
         return 0.0, 0.0

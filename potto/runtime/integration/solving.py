@@ -38,8 +38,9 @@ from potto.runtime.integration.methods.attempts import (
     uncertainty,
 )
 from potto.runtime.integration.methods.choices import (
-    long_as_a_rule,
+    endless,
     many,
+    many_variables,
     passes_on,
     to_be_seen,
     too_many,
@@ -141,12 +142,16 @@ def along_cuts(problem: Problem) -> Sums:
     most = trial(problem)
     stopped: list[Attempt] = []
     tables: list[Attempt] | None = None
+    if most is not None and endless(problem):  # of infinite ranges iteration takes long in every order
+        tables = by_tables(problem)
+    if tables and accurate(tables[0].sums, machine.rtol, machine):
+        return tables[0].sums
     for order, allowed, at_once in tried(problem, most):
         found = attempted(problem, order, allowed)
         if found.stopped and allowed != most:
             continue
-        if found.stopped and tables is None and long_as_a_rule(problem) and not found.events.every(Degenerate):
-            tables = eliminated(problem) if passes_on(problem) else []
+        if found.stopped and tables is None and many_variables(problem) and not found.events.every(Degenerate):
+            tables = by_tables(problem)
             if tables and accurate(tables[0].sums, machine.rtol, machine):
                 return tables[0].sums
         if at_once and most is not None and found.stopped and uncertainty(found.sums) < PROMISING:
@@ -164,6 +169,11 @@ def along_cuts(problem: Problem) -> Sums:
         return _by_samples_instead(problem, best(stopped)) or with_all(problem, stopped, most, tables)
     events.take(found.events, np.arange(problem.batch))
     return _along_axes(problem, problem.plan(order), found.sums)
+
+
+def by_tables(problem: Problem) -> list[Attempt]:
+    """The integral with its variables eliminated; nothing where these are few, or can't be."""
+    return eliminated(problem) if passes_on(problem) else []
 
 
 def with_all(problem: Problem, tried: list[Attempt], most: int | None, tables: list[Attempt] | None) -> Sums:
@@ -188,7 +198,7 @@ def with_all(problem: Problem, tried: list[Attempt], most: int | None, tables: l
     if not longer or not longer[-1].stopped:
         return finished(problem, best((*tried, *longer)))
     if tables is None:
-        tables = eliminated(problem) if passes_on(problem) else []
+        tables = by_tables(problem)
         if tables and accurate(tables[0].sums, max(ACCURATE, machine.rtol), machine):
             return tables[0].sums
     if len(longer) == 1:

@@ -116,10 +116,10 @@ def passes_on(problem: Problem) -> bool:
     return enough and not problem.machine.frozen and bool(eliminable(problem.term))
 
 
-def long_as_a_rule(problem: Problem) -> bool:
+def many_variables(problem: Problem) -> bool:
     """Whether iterated quadrature that had to stop is better not tried in another order before variables are
-    eliminated: more than three variables take long in each, and so does an infinite range."""
-    return len(problem.term.variables) > MOST_LEVELS or endless(problem)
+    eliminated: more than three take long in each."""
+    return len(problem.term.variables) > MOST_LEVELS
 
 
 def endless(problem: Problem) -> bool:
@@ -146,7 +146,7 @@ def tried(problem: Problem, most: int | None) -> Iterator[tuple[Integral, int | 
     term, levels = problem.term, problem.plan().levels
     cuts = sum(len(own.level.cuts) for own in levels)
     second = problem.machine.record.second  # what has no meaning at single places there is met in some orders alone
-    written = most is None or second or endless(problem) or cuts > COMPARED  # of infinite ranges tables come next
+    written = most is None or second or endless(problem) or cuts > COMPARED  # of infinite ranges tables came first
     if most is None or written or len(term.variables) != MOST_LEVELS or not _movable(term):
         yield from ((order, most, True) for order in preferred(problem))
         return
