@@ -35,6 +35,10 @@ class Span(Struct, frozen=True):
     def cover(self, other: Span) -> Span:
         return Span(min(self.start, other.start), max(self.end, other.end))
 
+    def touches(self, other: Span) -> bool:
+        """Whether they have a place in common, if only an end."""
+        return self.start <= other.end and other.start <= self.end
+
     def __len__(self) -> int:
         return self.end - self.start
 

@@ -30,7 +30,13 @@ PROGRAM = """
 def everything(library, file: str, text: str) -> list[object]:
     db = library.db
     found: list[object] = [ide.semantic_tokens(db, file), ide.document_symbols(db, file), ide.folding_ranges(db, file)]
-    found += [ide.inlay_hints(db, file, Span(0, len(text))), ide.code_lenses(db, file), ide.document_links(db, file)]
+    whole = Span(0, len(text))
+    found += [
+        ide.inlay_hints(db, file, whole),
+        ide.inline_values(db, file, whole),
+        ide.code_lenses(db, file),
+        ide.document_links(db, file),
+    ]
     found += [ide.hover_at(db, file, offset) for offset in range(0, len(text), 5)]
     found += [ide.references(db, file, offset) for offset in range(0, len(text), 11)]
     return found

@@ -1,7 +1,7 @@
 """Answers about whole files, put together from pieces that are kept in the form in which they are sent.
 
-Owns `PieceItems`, `sent`, `part_of`, `lined` and `whole`. After a key all parts but one are the same; those below it
-are moved if lines were added or removed.
+Owns `PieceItems`, `sent`, `part_of`, `lined`, `whole` and `touching`. After a key all parts but one are the same; those
+below it are moved if lines were added or removed.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from typing import Any
 from msgspec import Struct
 
 from potto.ide.names.places import PieceAt, pieces_of
+from potto.source import Span
 from potto_lsp.asking import Ask
 from potto_lsp.wire import Encoded
 
@@ -62,3 +63,17 @@ def whole(ask: Ask, part: Callable[[PieceAt], PieceItems], beside: Iterable[Any]
     found = [sent(beside)]
     found += [part(at).placed(line) for at, line in lined(ask)]
     return Encoded(found)
+
+
+def touching(
+    ask: Ask, part: Callable[[PieceAt], PieceItems], near: Callable[[PieceAt, Span], Iterable[Any]]
+) -> list[bytes]:
+    """The items of the pieces that touch the `range` that is asked about: of one that is all within it the `part`, of
+    another one those that are `near` it, as it is seen from the piece."""
+    span, found = ask.span, list[bytes]()
+    for at, line in lined(ask):
+        if span.start <= at.span.start and at.span.end <= span.end:
+            found.append(part(at).placed(line))
+        elif at.span.touches(span):
+            found.append(part_of(near(at, span.shift(-at.start))).placed(line))
+    return found

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from potto import ide
 from potto.ide.display.inlay_hints import piece_hints
+from potto.ide.display.inline_values import piece_values
+from potto.ide.names.places import PieceAt
 from potto.query import Database, query
 from potto.source import Span
 from potto_lsp import convert, protocol
 from potto_lsp.asking import Ask
-from potto_lsp.features.by_piece import PieceItems, lined, part_of, sent
+from potto_lsp.features.by_piece import PieceItems, part_of, sent, touching
 from potto_lsp.text import DocumentText, Encoding
 from potto_lsp.wire import Encoded
 
@@ -20,17 +22,19 @@ SETTINGS = {"type": "hints.types", "parameter": "hints.coordinates"}
 
 
 def inlay_hints(ask: Ask) -> Encoded:
-    span, text, found = ask.span, ask.text, list[bytes]()
+    encoding = ask.text.encoding
     off = frozenset(kind for kind, setting in SETTINGS.items() if ask.analysis.settings.get(setting) is False)
-    for at, line in lined(ask):
-        if span.start <= at.start and at.start + len(at.text) <= span.end:
-            found.append(_part(ask.db, ask.file, at.text, at.hidden, text.encoding, off).placed(line))
-        elif at.start <= span.end and span.start <= at.start + len(at.text):
-            hints = piece_hints(ask.db, ask.file, at.text, at.hidden)
-            near = [hint for hint in hints if span.start <= at.start + hint.offset <= span.end and hint.kind not in off]
-            found.append(part_of(_hint(DocumentText(at.text, text.encoding), hint) for hint in near).placed(line))
-    found.append(sent(_live(ask, span)))
-    return Encoded(found)
+
+    def part(at: PieceAt) -> PieceItems:
+        return _part(ask.db, ask.file, at.text, at.hidden, encoding, off)
+
+    def near(at: PieceAt, span: Span) -> Iterator[protocol.InlayHint]:
+        text = DocumentText(at.text, encoding)
+        for hint in piece_hints(ask.db, ask.file, at.text, at.hidden):
+            if span.start <= hint.offset <= span.end and hint.kind not in off:
+                yield _hint(text, hint)
+
+    return Encoded([*touching(ask, part, near), sent(_live(ask, ask.span))])
 
 
 @query(keep=1024)
@@ -81,9 +85,24 @@ def resolve(ask: Ask) -> Any:
     return {**ask.params, "tooltip": convert.markdown(hint.tooltip)} if hint.tooltip else ask.params
 
 
-def inline_values(ask: Ask) -> list[dict[str, Any]]:
-    found: list[dict[str, Any]] = []
-    for value in ide.inline_values(ask.db, ask.file, ask.span):
-        key = "expression" if value.kind == "expression" else "text"
-        found.append({"range": ask.range(value.span), key: value.text})
-    return found
+def inline_values(ask: Ask) -> Encoded:
+    encoding = ask.text.encoding
+
+    def near(at: PieceAt, span: Span) -> Iterator[dict[str, Any]]:
+        text = DocumentText(at.text, encoding)
+        values = piece_values(ask.db, ask.file, at.text, at.hidden)
+        return (_value(text, value) for value in values if value.span.touches(span))
+
+    return Encoded(touching(ask, lambda at: _values(ask.db, ask.file, at.text, at.hidden, encoding), near))
+
+
+@query(keep=1024)
+def _values(db: Database, file: str, text: str, hidden: tuple[str, ...], encoding: Encoding) -> PieceItems:
+    """The inline values of a piece."""
+    place = DocumentText(text, encoding)
+    return part_of(_value(place, value) for value in piece_values(db, file, text, hidden))
+
+
+def _value(text: DocumentText, value: ide.InlineValue) -> dict[str, Any]:
+    key = "expression" if value.kind == "expression" else "text"
+    return {"range": convert.range_of(text, value.span), key: value.text}

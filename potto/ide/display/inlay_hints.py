@@ -42,7 +42,7 @@ def inlay_hints(db: Database, file: str, span: Span) -> tuple[InlayHint, ...]:
     """The hints of the places in a span, in order."""
     found: list[InlayHint] = []
     for at in pieces_of(db, file):
-        if at.start <= span.end and span.start <= at.start + len(at.text):
+        if at.span.touches(span):
             moved = (_moved(hint, at.start) for hint in piece_hints(db, file, at.text, at.hidden))
             found += [hint for hint in moved if span.start <= hint.offset <= span.end]
     return tuple(found)

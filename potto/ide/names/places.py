@@ -182,6 +182,11 @@ class PieceAt(Struct, frozen=True):
     text: str
     hidden: tuple[str, ...] = ()
 
+    @property
+    def span(self) -> Span:
+        """Where it is in the file."""
+        return Span(self.start, self.start + len(self.text))
+
     def chunks(self, db: Database) -> Iterator[tuple[ChunkAt, str | None]]:
         """Its chunks, seen from its start, each with the name that it defines."""
         found = piece(db, self.text, is_diffeo(self.file))
