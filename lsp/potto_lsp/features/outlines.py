@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from potto import ide
-from potto.ide.navigation.outlines import piece_symbols
+from potto.ide.navigation.outlines import best_matches, piece_symbols, placeless_symbol
+from potto.modules import chunk_start, chunk_text
 from potto.query import Database, query
 from potto_lsp import convert, protocol
 from potto_lsp.asking import Ask
@@ -46,13 +47,22 @@ def _tree(text: DocumentText, symbol: ide.DocumentSymbol) -> protocol.DocumentSy
     }
 
 
-def workspace_symbols(ask: Ask) -> list[protocol.SymbolInformation]:
-    return [
-        {
-            "name": symbol.name,
-            "kind": KINDS[symbol.kind],
-            "location": convert.place(ask.analysis, symbol.location),
-            "containerName": symbol.container,
-        }
-        for symbol in ide.workspace_symbols(ask.db, ask.string("query") if ask.optional("query") else "")
-    ]
+def workspace_symbols(ask: Ask) -> Encoded:
+    found, analysis = list[bytes](), ask.analysis
+    for name, file in best_matches(ask.db, ask.string("query") if ask.optional("query") else ""):
+        text = analysis.text(file)
+        part = _found(ask.db, file, name, analysis.uri(file), text.encoding)
+        found.append(part.placed(text.lines.line_of(chunk_start(ask.db, file, name))))
+        ask.db.give_way()
+    return Encoded(found)
+
+
+@query(keep=2048)
+def _found(db: Database, file: str, name: str, uri: str, encoding: Encoding) -> PieceItems:
+    """A symbol of the workspace, placed by the first line of its chunk."""
+    symbol, text = placeless_symbol(db, file, name), DocumentText(chunk_text(db, file, name) or "", encoding)
+    place: protocol.Location = {"uri": uri, "range": convert.range_of(text, symbol.location.span)}
+    told: protocol.SymbolInformation = {
+        "name": symbol.name, "kind": KINDS[symbol.kind], "location": place, "containerName": symbol.container,
+    }  # fmt: skip
+    return part_of([told])

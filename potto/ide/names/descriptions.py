@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Literal
 
 from potto.ide.names.index import call_head
+from potto.ide.names.places import ChunkAt
 from potto.ide.names.symbols import home
 from potto.modules import chunk_text, chunks, is_diffeo, parsed
 from potto.modules.texts import piece, pieces
@@ -114,8 +115,11 @@ def kind_of(db: Database, file: str, name: str) -> Kind:
 def name_span(db: Database, file: str, name: str) -> Span:
     """Where a definition's name stands in its file."""
     chunk = home(db, file, name)
-    if chunk is None:
-        return Span(0, 0)
+    return Span(0, 0) if chunk is None else defined_at(db, chunk, name)
+
+
+def defined_at(db: Database, chunk: ChunkAt, name: str) -> Span:
+    """Where the name that a chunk defines stands."""
     for occurrence in chunk.index(db).occurrences:
         if occurrence.role == "define":
             return chunk.absolute(occurrence.span)

@@ -1,18 +1,21 @@
 """Outlines: the definitions of a file with what they bind, and those of the workspace by name.
 
-Owns `document_symbols` and `workspace_symbols`.
+Owns `document_symbols`, `workspace_symbols`, and `best_matches` and `placeless_symbol`, which the latter is made of.
 """
 
 from __future__ import annotations
 
 import os.path
 
+from msgspec.structs import replace
+
 from potto.ide.actions.imports import exports
 from potto.ide.model import DocumentSymbol, Location, SymbolKind, WorkspaceSymbol
-from potto.ide.names.descriptions import item_span, name_span, type_text, written_kind
+from potto.ide.names.descriptions import defined_at, type_text, written_kind
 from potto.ide.names.index import BoundName
 from potto.ide.names.places import ChunkAt, PieceAt, pieces_of
 from potto.ide.names.symbols import placeless
+from potto.modules import chunk_start
 from potto.query import Database, query
 from potto.source import Span
 from potto.syntax import nodes
@@ -111,6 +114,16 @@ def _child_kind(binder: BoundName) -> SymbolKind:
 
 def workspace_symbols(db: Database, text: str) -> tuple[WorkspaceSymbol, ...]:
     """The definitions of the workspace whose names contain the letters of `text` in this order, the likeliest first."""
+    found = []
+    for name, file in best_matches(db, text):
+        symbol, start = placeless_symbol(db, file, name), chunk_start(db, file, name)
+        place = Location(file, symbol.location.span.shift(start), symbol.location.full.shift(start))
+        found.append(replace(symbol, location=place))
+    return tuple(found)
+
+
+def best_matches(db: Database, text: str) -> list[tuple[str, str]]:
+    """Their names and files."""
     wanted = text.casefold()
     scored: list[tuple[int, str, str]] = []
     for folded, name, file in exports(db):
@@ -118,7 +131,7 @@ def workspace_symbols(db: Database, text: str) -> tuple[WorkspaceSymbol, ...]:
         if score is not None:
             scored.append((score, name, file))
     scored.sort()
-    return tuple(_found(db, name, file) for _, name, file in scored[:MOST_FOUND])
+    return [(name, file) for _, name, file in scored[:MOST_FOUND]]
 
 
 def _score(wanted: str, name: str) -> int | None:
@@ -134,7 +147,9 @@ def _score(wanted: str, name: str) -> int | None:
     return 3
 
 
-def _found(db: Database, name: str, file: str) -> WorkspaceSymbol:
-    container = os.path.splitext(os.path.basename(file))[0]
-    place = Location(file, name_span(db, file, name), item_span(db, file, name))
-    return WorkspaceSymbol(name, written_kind(db, file, name), container, place)
+@query(keep=2048)
+def placeless_symbol(db: Database, file: str, name: str) -> WorkspaceSymbol:
+    """A definition, its places relative to its chunk."""
+    container, chunk = os.path.splitext(os.path.basename(file))[0], placeless(db, file, name)
+    spans = (Span(0, 0), Span(0, 0)) if chunk is None else (defined_at(db, chunk, name), Span(0, len(chunk.text)))
+    return WorkspaceSymbol(name, written_kind(db, file, name), container, Location(file, *spans))
