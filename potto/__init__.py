@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from potto.integrate.costs import counting
     from potto.projects.settings import settings
     from potto.python.api import Module, ProgramWarning, Workspace, compile, load
+    from potto.python.following import Advance
     from potto.python.functions import Function, deriv
     from potto.python.gradients import grad, jacobian, jvp, value_and_grad, vjp
     from potto.python.hessian import hessian, hvp
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 
 __version__ = "0.1.0"
 __all__ = [
+    "Advance",
     "Estimate",
     "Function",
     "Interrupted",
@@ -56,6 +58,7 @@ __all__ = [
 ]
 
 _HOMES = {
+    "Advance": "potto.python.following",
     "Estimate": "potto.runtime.answers.estimate",
     "Function": "potto.python.functions",
     "Interrupted": "potto.python.tiles",

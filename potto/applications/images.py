@@ -18,7 +18,7 @@ from potto.kernels.cells import Array
 from potto.kernels.errors import WRONG_CALL
 from potto.runtime.answers.batches import INTERRUPTED
 from potto.runtime.answers.estimate import Estimate
-from potto.runtime.evaluation.record import Gauge, watching
+from potto.runtime.evaluation.gauge import Gauge, watching
 
 BAND = 1 << 18  # pixels of one array call, which is evaluated in blocks
 
@@ -102,8 +102,16 @@ def sampled(call: Call, places: Sequence[Array], progress: Callable[[int], None]
 
 def _gauge(progress: Callable[[int], None], start: int, stop: int) -> Gauge:
     """What tells how many are done while one band is."""
-    gauge = Gauge()
-    gauge.told = lambda: progress(start + int(gauge.share * (stop - start)))
+    gauge, known = Gauge(), start
+
+    def told() -> None:
+        nonlocal known
+        done = start if gauge.limit else start + int(gauge.share * (stop - start))
+        if done > known:
+            known = done
+            progress(done)
+
+    gauge.told = told
     return gauge
 
 

@@ -60,20 +60,9 @@ class Console(Struct):
     @contextmanager
     def waiting(self) -> Iterator[None]:
         """In this block a line says how far an evaluation is, for a person who waits; it goes away when it is over."""
-        if not self.err.isatty():
-            yield
-            return
-        from potto.evaluating.progress import Progress
-        from potto.runtime.evaluation.record import Gauge, watching
+        from potto.evaluating.progress import shown
 
-        def columns() -> int:
-            try:
-                return os.get_terminal_size(self.err.fileno()).columns or 80
-            except (OSError, ValueError):
-                return 80
-
-        with Progress(self.err, columns, wants_color(self.color, self.err)) as progress, watching(Gauge()) as gauge:
-            progress.gauge = gauge
+        with shown(self.err, wants_color(self.color, self.err)):
             yield
 
     def palette(self, stream: TextIO) -> Palette:

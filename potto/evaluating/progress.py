@@ -1,20 +1,21 @@
 """A line that says how far an evaluation is, and how long the rest may take, for a person who waits.
 
-Owns `Progress` and `duration`.
+Owns `Progress`, `shown` and `duration`.
 """
 
 from __future__ import annotations
 
+import os
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, TextIO
 
 if TYPE_CHECKING:  # the prompt shows itself before what evaluates is loaded
-    from potto.runtime.evaluation.record import Gauge
+    from potto.runtime.evaluation.gauge import Gauge
 
 PATIENCE = 0.5  # seconds before progress is shown
-SURE = 0.01  # the smallest share of the work from which the rest is told
 PLAIN = "evaluating"  # one evaluation, whose gauge says how far it is
 CLEAR, DIM, OFF = "\r\x1b[K", "\x1b[2m", "\x1b[0m"
 
@@ -89,9 +90,27 @@ class Progress:
         gauge = self.gauge
         if self._share:
             return f"{_rest(now - self._start, self._share)}{' or more' if self._open else ''} left"
-        if self._text != PLAIN or gauge is None or not SURE < gauge.share <= 1:
-            return ""
-        return f"{'at most ' if gauge.limit else ''}{_rest(now - gauge.start, gauge.share)} left"
+        left = gauge.left(now) if gauge is not None and self._text == PLAIN else None
+        return "" if gauge is None or left is None else f"{'at most ' if gauge.limit else ''}{duration(left)} left"
+
+
+@contextmanager
+def shown(stream: TextIO, dim: bool = False) -> Iterator[None]:
+    """In this block a line says how far an evaluation is, for a person who waits; it goes away when it is over. Nothing
+    where the stream is no terminal."""
+    if not stream.isatty():
+        yield
+        return
+    from potto.runtime.evaluation.gauge import Gauge, watching
+
+    def columns() -> int:
+        try:
+            return os.get_terminal_size(stream.fileno()).columns or 80
+        except (OSError, ValueError):
+            return 80
+
+    with Progress(stream, columns, dim) as progress, watching(Gauge()) as progress.gauge:
+        yield
 
 
 def _rest(spent: float, share: float) -> str:

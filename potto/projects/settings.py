@@ -1,7 +1,8 @@
 """How numbers are asked for: the method, the accuracy and the limits of an evaluation.
 
-Owns `Settings` and the settings in force, which belong to the thread (or task) that set them. Knows nothing of what
-obeys them: the runtime reads them, the faces set them. `respelled` writes advice as each face has its settings.
+Owns `Settings` and the settings in force, which belong to the thread (or task) that set them, and with these who helps
+and who is told of progress. Knows nothing of what obeys them: the runtime reads them, the faces set them. `respelled`
+writes advice as each face has its settings.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ import re
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from msgspec import Struct
 from msgspec.structs import replace
@@ -31,6 +32,7 @@ METHODS: tuple[str, ...] = get_args(Method)
 Backend = Literal["auto", "numpy", "native"]
 BACKENDS: tuple[str, ...] = get_args(Backend)
 CHOICES = {"method": METHODS, "backend": BACKENDS}
+HELPERS = ("executor", "progress")  # which change no number
 
 # The relative accuracy that samples are held against where nobody asked for another one: an error of 4 standard errors
 # of 10,000 samples of a condition that holds half of the time is 4 % of the answer.
@@ -90,8 +92,10 @@ class _Changes(Struct, frozen=True):
 
 
 DEFAULTS = Settings()
+Progress = Callable[[Any], object] | bool | None
 _changes: ContextVar[_Changes | None] = ContextVar("potto_settings", default=None)
 _executor: ContextVar[Executor | None] = ContextVar("potto_executor", default=None)
+_progress: ContextVar[Progress] = ContextVar("potto_progress", default=None)
 
 
 def current(base: Settings = DEFAULTS) -> Settings:
@@ -106,11 +110,29 @@ def executor() -> Executor | None:
     return _executor.get()
 
 
+def progress() -> Progress:
+    """Who is told how far calls are: a function, or with True a person at the terminal."""
+    return _progress.get()
+
+
+@contextmanager
+def unfollowed() -> Iterator[None]:
+    """In this block nobody is told how far calls are."""
+    token = _progress.set(None)
+    try:
+        yield
+    finally:
+        _progress.reset(token)
+
+
 def problem(name: str, value: object) -> str | None:
     """Why `value` cannot be the setting `name`, or None if it can."""
     if name == "executor":
         able = value is None or callable(getattr(value, "submit", None))
         return None if able else f"executor must be a concurrent.futures.Executor or None, not {value!r}"
+    if name == "progress":
+        able = value is None or isinstance(value, bool) or callable(value)
+        return None if able else f"progress must be True, a function or None, not {value!r}"
     if name in CHOICES:
         if value not in CHOICES[name]:
             return f"{name} must be one of {', '.join(CHOICES[name])}, not {value!r}"
@@ -120,7 +142,7 @@ def problem(name: str, value: object) -> str | None:
             return f"machine code needs llvmlite: {install_command('jit')}"
         return None
     if name not in Settings.__struct_fields__:
-        known = (*Settings.__struct_fields__, "executor")
+        known = (*Settings.__struct_fields__, *HELPERS)
         return f"there is no setting `{name}`; there are {', '.join(known)}"
     if isinstance(value, bool) or not isinstance(value, int | float):
         return f"{name} must be a number, not {value!r}"
@@ -152,17 +174,21 @@ def settings(**changes: object) -> Iterator[Settings]:
 
     `executor`: any `concurrent.futures.Executor`, which evaluates tiles of large batches (threads, processes,
     `dask.distributed.Client(…).get_executor()`, mpi4py's); None for none. It stays open, and its owner's.
+    `progress`: True for a line on the terminal that says how far a call is, after half a second, and how long the rest
+    may take; or a function, which is called with an `Advance` ten times a second at the most.
     """
     for name, value in changes.items():
         complaint = problem(name, value)
         if complaint is not None:
             raise PottoError([BAD_SETTING(Span(0, 0), complaint)])
-    numbers = {name: value for name, value in changes.items() if name != "executor"}
+    numbers = {name: value for name, value in changes.items() if name not in HELPERS}
     before = _changes.get()
     token = _changes.set(_Changes(numbers if before is None else {**before.values, **numbers}))
     helpers = _executor.set(changes.get("executor", _executor.get()))  # type: ignore[arg-type]  # `problem` looked
+    told = _progress.set(changes.get("progress", _progress.get()))  # type: ignore[arg-type]
     try:
         yield current()
     finally:
+        _progress.reset(told)
         _executor.reset(helpers)
         _changes.reset(token)

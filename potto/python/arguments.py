@@ -34,6 +34,7 @@ ToFunction = Callable[[Any], Value | None]
 
 
 LEAST = 2048  # members, from which on a batch has blocks: below, the calls for some would cost as much as all
+PATIENCE = 2.0  # seconds of the processor after which a smaller one has blocks as well: what is done can be kept
 
 
 class Batch(Struct, frozen=True):

@@ -21,7 +21,7 @@ from potto.diagnostics import PottoError
 from potto.integrate.costs import wanted
 from potto.kernels.cells import Cell, Value
 from potto.projects.settings import Settings
-from potto.python.arguments import LARGEST, LEAST, Batch, with_axes, without_axes
+from potto.python.arguments import LARGEST, LEAST, PATIENCE, Batch, with_axes, without_axes
 from potto.python.arrays import is_batch, shape_together
 from potto.runtime.answers.convergence import precise
 from potto.runtime.answers.estimate import Estimate
@@ -29,7 +29,7 @@ from potto.runtime.evaluate import Clock, Program, bar, number, report, stats_of
 from potto.runtime.evaluation.derivatives.duals import merge
 from potto.runtime.evaluation.functions import Closure
 from potto.runtime.evaluation.machine import WATCHING, Machine
-from potto.runtime.evaluation.record import Record, watched
+from potto.runtime.evaluation.record import Record
 from potto.runtime.integration.direct import Direct, SettledAround
 from potto.runtime.integration.settled_calls import Batches, SettledCall, unused
 
@@ -141,9 +141,10 @@ class AtOnce(PreparedCall, frozen=True, eq=False):
 
 
 class Together(PreparedCall, frozen=True, eq=False):
-    """What a call takes for a batch of numbers."""
+    """What a call takes for a batch of numbers. most: members of one that is likely to be done soon."""
 
     batches: Batches
+    most: int
 
     def answer(self, args: tuple[Any, ...], settings: Settings) -> Estimate | None:
         """As of `AtOnce`, for arrays that make a batch of several members that is not done in tiles."""
@@ -151,7 +152,7 @@ class Together(PreparedCall, frozen=True, eq=False):
         if shape is None or not self.asked(args, settings):
             return None
         batch = Batch(shape)
-        env = self._env(args, batch) if 1 < batch.size < LEAST else None
+        env = self._env(args, batch) if 1 < batch.size <= self.most else None
         if env is None:
             return None
         try:
@@ -206,9 +207,10 @@ def together(
     batches = direct.batches(unused(machine), dict(zip(term.params, values, strict=True)))
     if batches is None or None in reads:
         return None
-    return Together(
-        machine.settings, tuple(read for read in reads if read is not None), type(found), wrt, False, batches
-    )
+    spent = max(found.seconds - found.compile_seconds, 1e-6)
+    most = min(LEAST - 1, max(found.value.size, int(found.value.size * PATIENCE / spent)))
+    known = tuple(read for read in reads if read is not None)
+    return Together(machine.settings, known, type(found), wrt, False, batches, most)
 
 
 def at_once(
@@ -262,7 +264,7 @@ def _read(name: str, arg: Any, value: Value, dual: bool) -> Read | None:
 
 def _looked_at() -> bool:
     """Whether anyone wants to know more of a call than its answer."""
-    return watched() or wanted() or WATCHING.get() is not None
+    return wanted() or WATCHING.get() is not None
 
 
 def _told(found: Estimate) -> dict[str, Any]:

@@ -18,6 +18,7 @@ from potto.kernels.cells import Value
 from potto.projects.settings import current
 from potto.python.arguments import LEAST, Batch
 from potto.python.at_once import AtOnce, Together, at_once, together
+from potto.python.following import followed
 from potto.reports.render import Located, ProgramError
 from potto.runtime.answers.estimate import Estimate
 from potto.runtime.answers.records import named_answer
@@ -48,7 +49,7 @@ class Call(Struct, frozen=True, eq=False):
     def run(self, values: Sequence[Value], batch: Batch) -> Estimate:
         """The estimate of the call for these arguments. Raises PottoError."""
         machine = self.world.program.machine(current(self.world.settings(self.file)))
-        with Clock() as clock:
+        with followed(), Clock() as clock:
             value = self.value(values, machine)
         estimate = report(value, machine, clock)
         whole = as_dual(estimate) if self._gives_dual() else estimate

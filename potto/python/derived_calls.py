@@ -21,6 +21,7 @@ from potto.projects.settings import current
 from potto.python.arguments import LEAST, Batch, value_of, with_axes
 from potto.python.calls import Call
 from potto.python.derivative_forms import by_name, in_lists, must_match, weighted
+from potto.python.following import followed
 from potto.python.moving import each_moving, own, size, with_own, with_places
 from potto.python.sided import with_sides
 from potto.python.slopes import Gradient
@@ -153,7 +154,8 @@ class DerivedCall:
         k = machine.directions
         values = [pad(with_own(name, value, moving), k) for name, value in self.arguments]
         self.moved = values, machine
-        with self.clock:
+        with followed(), self.clock:
+            machine.record.follow()
             value = in_lists(as_a_whole(machine, self.call.elaborated, tuple(values), self.called))
             if not _numbers(value):
                 raise wrong_call("only a number or a tuple of numbers has a gradient")

@@ -15,27 +15,25 @@ import os
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, wait
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager
 from contextvars import ContextVar
 from functools import cache
 from itertools import groupby, pairwise
-from typing import Any, Protocol
+from typing import Any
 
 from msgspec import Struct, field
-from msgspec.structs import asdict, replace
+from msgspec.structs import replace
 
-from potto.diagnostics import PottoError
-from potto.evaluating.world import World
-from potto.integrate.costs import counting, wanted
+from potto.integrate.costs import wanted
 from potto.kernels.cells import Value, all_arrays, map_arrays
 from potto.kernels.making import making
-from potto.projects.settings import Settings, current, executor, settings
-from potto.python.arguments import LEAST, Batch, cut, flattened
-from potto.python.calls import Call
-from potto.python.derived_calls import gradient
+from potto.projects.settings import current, executor
+from potto.python.arguments import LEAST, PATIENCE, Batch, cut, flattened
+from potto.python.following import followed
+from potto.python.tasks import Task, Tiled, whole
 from potto.runtime.answers.batches import joined, unfinished, with_what_was_made
 from potto.runtime.answers.estimate import Estimate
-from potto.runtime.evaluation.record import advancing
+from potto.runtime.evaluation.gauge import Overtime, advancing, patient
 
 # Members of a block: as many as take ENOUGH seconds at least, tried from PILOT on; after less than LITTLE with 64 times
 # as many, else with twice as many. What is cut in a block costs a few milliseconds whatever there is of it: 16 blocks
@@ -45,6 +43,10 @@ from potto.runtime.evaluation.record import advancing
 # AHEAD times as large ones are tried in the middle of the batch.
 PILOT, MOST = 1 << 6, 1 << 18
 ENOUGH, LITTLE, LONG = 0.1, 0.005, 1.0
+# Where a block takes longer than PATIENCE a single member is done first, then so many: up to ten are done one by one
+# where they are cut. Blocks may take as long as LONGEST where that pays: twelve members that take 0.7 s each take 2.1
+# together.
+SEVERAL, LONGEST = 16, 8.0
 FALLS = 0.6
 # The first block is asked again: what it takes may only be what everything takes for the first time. So is a larger one
 # that takes less than COLD seconds, if a member of it costs DEARER times what one cost before: kernels are made at the
@@ -70,65 +72,35 @@ class Interrupted(KeyboardInterrupt):
         self.estimate = estimate
 
 
-class Tiled(Protocol):
-    """A function as tiles know it."""
-
-    _world: World
-    _file: str
-
-    def bare(self) -> Tiled:
-        """Itself without arguments, as it travels."""
-
-    def _arguments(self, given: Any) -> tuple[list[tuple[str, Value]], Batch]: ...
-
-    def _call(self, given: Any) -> Call: ...
-
-
-class Task(Struct, frozen=True):
-    """Blocks of a batch as they travel: the function, its arguments in one row of members for each block, what it is
-    differentiated by, how numbers are asked for, and whether books are kept of what they cost."""
-
-    function: Tiled
-    blocks: tuple[Any, ...]
-    wrt: tuple[str, ...]
-    settings: Settings
-    counted: bool = False
-
-    def answers(self) -> list[Estimate] | None:
-        """The answers, block by block; None if there is an error, which is then met again by who asks."""
-        found = []
-        with settings(**asdict(self.settings), executor=None), counting() if self.counted else nullcontext():
-            try:
-                for given in self.blocks:
-                    arguments, batch = self.function._arguments(given)
-                    found.append(whole(self.function, given, self.wrt, arguments, batch))
-            except PottoError:
-                return None
-        return found
-
-
-def whole(
-    function: Tiled, given: Any, wrt: tuple[str, ...], arguments: list[tuple[str, Value]], batch: Batch
-) -> Estimate:
-    """The estimate of a call for all members of a batch at once, with its derivatives by `wrt`."""
-    call = function._call(given)
-    return gradient(call, arguments, wrt, batch) if wrt else call.run([value for _, value in arguments], batch)
-
-
 def in_tiles(
     function: Tiled, given: Any, wrt: tuple[str, ...], arguments: list[tuple[str, Value]], batch: Batch
 ) -> Estimate:
-    """The estimate of a call, in tiles if its batch is large. Raises Interrupted, PottoError."""
-    count = batch.size
-    if count < LEAST or any(a.size != count for _, value in arguments for a in all_arrays(value)):
-        return whole(function, given, wrt, arguments, batch)
+    """The estimate of a call, in tiles if its batch is large, or takes long. Raises Interrupted, PottoError."""
+    with followed():
+        if batch.size < 2 or any(a.size != batch.size for _, value in arguments for a in all_arrays(value)):
+            return whole(function, given, wrt, arguments, batch)
+        return _many(function, given, wrt, arguments, batch)
+
+
+def _many(
+    function: Tiled, given: Any, wrt: tuple[str, ...], arguments: list[tuple[str, Value]], batch: Batch
+) -> Estimate:
+    """The estimate for several members, whose arrays all have one number for each."""
+    count, chosen = batch.size, current(function._world.settings(function._file))
+    key, first = (function._call(given).elaborated, wrt, chosen, count < LEAST), PILOT
+    if count < LEAST and _sizes.get(key, (count, False))[0] >= count:
+        try:
+            with patient(_later_than(PATIENCE if key not in _sizes else math.inf)):
+                return whole(function, given, wrt, arguments, batch)
+        except Overtime:
+            first = 1
 
     def here(part: Part) -> Estimate:
-        at = slice(*part)
-        some = [(name, map_arrays(value, lambda a: a[at])) for name, value in arguments]
-        return whole(function, given, wrt, some, Batch((part[1] - part[0],)))
+        size, at = part[1] - part[0], slice(*part)
+        some = [(name, map_arrays(value, lambda a: a[at] if size > 1 else float(a[part[0]])))
+                for name, value in arguments]  # fmt: skip
+        return whole(function, given, wrt, some, Batch((size,)))
 
-    chosen = current(function._world.settings(function._file))
     bare = function.bare()
 
     @cache
@@ -138,8 +110,7 @@ def in_tiles(
     def task(parts: list[Part]) -> Task:
         return Task(bare, tuple(cut(flat(), slice(*part)) for part in parts), wrt, chosen, wanted())
 
-    key = (function._call(given).elaborated, wrt, chosen)
-    found = _Tiles(count, here, task, key).run(None if function._world._held else executor())
+    found = _Tiles(count, here, task, key, first).run(None if function._world._held else executor())
     return batch.shaped(found, own=True)
 
 
@@ -160,7 +131,8 @@ def growing() -> Iterator[None]:
 
 
 class _Tiles(Struct):
-    """One batch. key: for whom the size of blocks is kept. done: the answers so far, by the first member of their
+    """One batch. key: for whom the size of blocks is kept. first: the size that is tried first; 1 where more are known
+    to take long. done: the answers so far, by the first member of their
     block. tried: those of blocks that only told the size, with that member. again: how many blocks were lost. spent:
     seconds that the last block took that was evaluated here; total: all of them."""
 
@@ -168,6 +140,7 @@ class _Tiles(Struct):
     here: Callable[[Part], Estimate]
     task: Callable[[list[Part]], Task]
     key: Any
+    first: int = PILOT
     done: dict[int, Estimate] = field(default_factory=dict)
     tried: list[tuple[int, Estimate]] = field(default_factory=list)
     blocks: list[Part] = field(default_factory=list)
@@ -204,20 +177,29 @@ class _Tiles(Struct):
 
     def _size(self) -> int:
         """The size of blocks, by trying where it is not known; one that was taken is done."""
-        size, most = _sizes.get(self.key, (PILOT, False))
-        tried, each = size, math.inf
+        size, most = _sizes.get(self.key, (PILOT, False)) if self.first > 1 else (1, False)
+        tried, each, long = size, math.inf, LONG if self.first > 1 else LONGEST
         while not most and 2 * size <= self.count and size < MOST:
-            self._alone((0, size))
-            cold = each == math.inf or (self.spent < COLD and self.spent > DEARER * each * size)
+            if not self._done_within(PATIENCE if each == math.inf else 2 * long, (0, size)):
+                if each < math.inf:
+                    size, most = tried, True
+                    break
+                size, tried, long = 1, 1, LONGEST
+                continue
+            first = each == math.inf and long == LONG
+            cold = first or (self.spent < COLD and self.spent > DEARER * each * size)
             if cold and self.spent >= ENOUGH:
                 self._put_aside()
                 self._alone((0, size))
             fallen, each = self.spent < FALLS * each * size, self.spent / size
-            most = self.spent >= (LONG if fallen else ENOUGH)
+            most = self.spent >= (long if fallen else ENOUGH)
             if most:
+                if not fallen and long > LONG and size > tried:  # to no avail
+                    size = tried
+                    self._put_aside()
                 break
-            tried = size
-            size = min(size * (64 if self.spent < LITTLE else 2 if self.spent < ENOUGH else 4), MOST)
+            tried, steps = size, 64 if self.spent < LITTLE else 2 if self.spent < ENOUGH else 4
+            size = min(max(size * steps, SEVERAL), MOST)
             self._put_aside()
         if not most and self.spent:  # twice as many take less than twice ENOUGH, and so may all
             while size < self.count and size < MOST and self.spent * self.count <= 2 * ENOUGH * tried:
@@ -257,6 +239,16 @@ class _Tiles(Struct):
         self.tried.append((block[0], self.done[block[0]]))
         self._alone(block)
         return self.spent
+
+    def _done_within(self, seconds: float, block: Part) -> bool:
+        """Whether a block is done; it is given up when it takes longer, unless it is a single member."""
+        with patient(_later_than(seconds if block[1] - block[0] > 1 else math.inf)):
+            try:
+                self._alone(block)
+            except Overtime:
+                self.spent = seconds
+                return False
+        return True
 
     def _put_aside(self) -> None:
         self.tried += self.done.items()
@@ -351,6 +343,12 @@ class _Tiles(Struct):
         if self.again:
             stats["blocks done again"] = self.again
         return replace(found, seconds=time.perf_counter() - self.start, stats=stats)
+
+
+def _later_than(seconds: float) -> Callable[[], bool]:
+    """Whether this thread has worked for longer than that since, without what it has made."""
+    start, made = time.thread_time(), making.worked
+    return lambda: time.thread_time() - start - (making.worked - made) > seconds
 
 
 def _parts(count: int, size: int) -> Iterator[Part]:

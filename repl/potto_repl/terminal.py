@@ -160,7 +160,7 @@ class Terminal:
                     self.progress.note("starting")
                 self._attach()
                 self.progress.note(PLAIN)
-                from potto.runtime.evaluation.record import Gauge, watching
+                from potto.runtime.evaluation.gauge import Gauge, watching
                 from potto_repl.backslash_symbols import readable
                 from potto_repl.respond import stream
 

@@ -4,6 +4,7 @@ interruption that keeps what is done; functions that travel as text."""
 from __future__ import annotations
 
 import importlib.util
+import io
 import os
 import pickle
 import signal
@@ -22,11 +23,12 @@ import numpy as np
 import pytest
 
 import potto
+from potto.evaluating import progress as showing
 from potto.kernels.making import making
-from potto.python import tiles
+from potto.python import following, tiles
 from potto.python.workers import Workers
 from potto.runtime.answers.batches import INTERRUPTED
-from potto.runtime.evaluation.record import Gauge, watching
+from potto.runtime.evaluation.gauge import Gauge, watching
 
 TEXT = """
 from shaders import bright
@@ -199,15 +201,16 @@ def test_blocks_are_large_where_a_block_costs_more_than_its_members(
     assert size_by(monkeypatch, 25600, lambda members: block + member * members) == size
 
 
-def size_by(monkeypatch: pytest.MonkeyPatch, count: int, seconds: Callable[[int], float]) -> int:
-    """The size of blocks where one takes so many seconds."""
+def size_by(monkeypatch: pytest.MonkeyPatch, count: int, seconds: Callable[[int], float], first: int = 64) -> int:
+    """The size of blocks where one takes so many seconds; `first` is tried first."""
 
     def alone(self: Any, part: tuple[int, int]) -> None:
         self.spent = seconds(part[1] - part[0])
         self.done[part[0]] = None
 
     monkeypatch.setattr(tiles._Tiles, "_alone", alone)
-    return tiles._Tiles(count, lambda part: None, lambda parts: None, count)._size()  # type: ignore[arg-type, return-value]
+    batch: Any = (count, lambda part: None, lambda parts: None, count, first)
+    return tiles._Tiles(*batch)._size()
 
 
 def test_blocks_are_large_where_few_members_cost_as_much_as_many(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -220,6 +223,17 @@ def test_blocks_are_large_where_few_members_cost_as_much_as_many(monkeypatch: py
 
     assert size_by(monkeypatch, 1 << 16, one_by_one) == 4096
     assert size_by(monkeypatch, 1 << 14, one_by_one) == 512
+
+
+def test_blocks_of_what_takes_long_are_large_where_members_share_what_they_cost(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Eight spheres: 0.7 s for each of up to ten members, 0.16 s for each of more. Others cost the same in any number:
+    the least that is tried is one, then 16, which would keep an interrupt from what is done for too long."""
+    for name, seconds in (("ENOUGH", 0.1), ("LONG", 1.0)):
+        monkeypatch.setattr(tiles, name, seconds)
+    assert size_by(monkeypatch, 1000, lambda members: members * (0.7 if members < 11 else 0.16), 1) == 16
+    assert size_by(monkeypatch, 900, lambda members: 0.7 * members, 1) == 1
 
 
 def test_what_is_made_for_a_larger_block_does_not_count_as_its_members(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -324,6 +338,32 @@ def test_an_interrupt_keeps_what_is_done(module: Any, monkeypatch: pytest.Monkey
     assert found.reasons_of(700) == (INTERRUPTED.message,)
 
 
+def test_of_a_small_batch_that_takes_long_what_is_done_is_kept(module: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """From the first member on. It goes on from there in another call of the same kind: nothing is given up again."""
+    x, alone = X[:9], tiles._Tiles._alone
+    whole, given_up = module.plain(x, T), []
+
+    def interrupted(self: Any, block: tuple[int, int]) -> Any:
+        if block[0] == 4:
+            raise KeyboardInterrupt
+        return alone(self, block)
+
+    monkeypatch.setattr(tiles, "PATIENCE", 0.0)
+    monkeypatch.setattr(tiles, "LONGEST", 0.0)
+    monkeypatch.setattr(tiles._Tiles, "_alone", interrupted)
+    for _ in range(2):
+        with pytest.raises(potto.Interrupted) as stop:
+            module.plain(x, T)
+        found = stop.value.estimate
+        assert (np.abs(found.value - whole.value) <= found.error + whole.error)[:4].all()
+        assert found.member_converged.tolist() == [True] * 4 + [False] * 5
+    monkeypatch.setattr(tiles, "patient", given_up.append)
+    monkeypatch.setattr(tiles._Tiles, "_alone", alone)
+    found = module.plain(x, T)
+    assert found.stats["blocks"] == 9 and not given_up
+    assert (np.abs(found.value - whole.value) <= found.error + whole.error).all()
+
+
 @pytest.mark.parametrize("last", [1, 3])
 def test_an_interrupt_while_the_size_of_blocks_is_tried(last: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """64 members, then 128, 256 and so on: the last block that was done is kept, though it only told the size."""
@@ -374,6 +414,44 @@ def test_progress_is_told(module: Any) -> None:
         module.plain(X, T)
     assert shares == sorted(shares) and shares[-1] == 1 and len(shares) > 10
     assert not gauge.limit and gauge.evaluations > 0
+
+
+def test_progress_is_told_to_a_function_which_may_interrupt(module: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Calls of all kinds, each from its beginning to its end."""
+    monkeypatch.setattr(following, "EVERY", 0.0)
+    told: list[potto.Advance] = []
+    one, every = potto.compile("def f(t) integral [0, 1] [x^2 < t]*exp(x) d(x)").f, potto.grad(module.plain, "t")
+    calls = (lambda: module.plain(X, T)), (lambda: every(X, T)), (lambda: one(0.3)), (lambda: potto.jacobian(one)(0.4))
+    with potto.settings(progress=told.append):
+        for call in calls:
+            told.clear()
+            found = call()
+            shares = [advance.share for advance in told if not advance.at_most]
+            assert shares == sorted(shares) and shares[-1] == 1 and told[-1].left == 0  # type: ignore[type-var]
+            assert 0 < told[0].evaluations <= told[-1].evaluations == found.evals
+
+    def enough(advance: potto.Advance) -> None:
+        if not advance.at_most and advance.share is not None and advance.share > 0.5:
+            raise KeyboardInterrupt
+
+    with potto.settings(progress=enough), pytest.raises(potto.Interrupted) as stop:
+        module.plain(X, T)
+    assert 0.5 < np.mean(stop.value.estimate.member_converged) < 0.6
+
+
+def test_progress_is_shown_on_a_terminal_and_nowhere_else(module: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    class Terminal(io.StringIO):
+        def isatty(self) -> bool:
+            return seen
+
+    monkeypatch.setattr(showing, "PATIENCE", 0.0)
+    for seen in (True, False):
+        monkeypatch.setattr(sys, "stderr", screen := Terminal())
+        with potto.settings(progress=True):
+            module.plain(X, T)
+        assert ("evaluating, " in screen.getvalue(), screen.getvalue().endswith("\x1b[K")) == (seen, seen)
+    with pytest.raises(potto.PottoError, match="progress must be"), potto.settings(progress="yes"):
+        pass
 
 
 # What travels

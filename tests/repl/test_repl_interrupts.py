@@ -12,7 +12,7 @@ from potto_repl.respond import respond
 from screens import Screen
 
 from potto.evaluating.progress import Progress
-from potto.runtime.evaluation.record import Gauge
+from potto.runtime.evaluation.gauge import Gauge
 
 AT_ONCE = 0.2  # seconds; what an interrupt may take
 TRIES = 4  # on a machine that is busy with something else as well
@@ -154,6 +154,7 @@ def line(gauge=None, columns=100, note=None, after=2.0):
 def gauge(share, *, limit=True, evaluations=0, start=0.0, samplings=0):
     found = Gauge(evaluations=evaluations, share=share, limit=limit, samplings=samplings)
     found.start = time.perf_counter() + start
+    found.at = found.start + 2.0
     return found
 
 
@@ -166,6 +167,7 @@ def test_how_long_it_will_take_is_told_from_what_is_done():
     assert "18 s or more left" in line(note=(("f: 6 of 60 points", 0.1), {"open": True})).replace("18.0", "18")
     assert "left" not in line(gauge(0.5), note=(("step 3",), {}))  # one evaluation of how many?
     assert "3 min left" in line(gauge(0.01001, limit=False, samplings=1))
+    assert "1.0 s left" in line(gauge(0.5, limit=False), after=3.0)  # of what was told a second ago
 
 
 @pytest.mark.parametrize("columns", [10, 20, 30, 40, 60, 80])
@@ -188,7 +190,7 @@ def test_a_second_integral_that_is_sampled_says_no_time():
 
 
 def test_evaluations_say_how_far_they_are(talk):
-    from potto.runtime.evaluation.record import watching
+    from potto.runtime.evaluation.gauge import watching
 
     def told(text):
         seen = Gauge()

@@ -1,14 +1,12 @@
-"""The record of one evaluation: what it has done so far, and how far it has come, for whoever watches.
+"""The record of one evaluation: what it has done so far, which `gauge` tells whoever watches.
 
-Owns `Record`, `Gauge`, `watching` and `advancing`. Without a watcher no gauge is kept.
+Owns `Record`.
 """
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
-from contextvars import ContextVar
 from typing import Any
 
 import numpy as np
@@ -23,85 +21,7 @@ from potto.kernels.cells import Array, Value
 from potto.kernels.tape import Node
 from potto.runtime.answers.allowances import NOTHING, Allowed
 from potto.runtime.answers.convergence import Shortfalls, merged
-
-
-class Gauge(Struct):
-    """How far the evaluation that goes on has come. Another thread may look at any time.
-
-    start: when it began, by `time.perf_counter`. evaluations: of integrands so far. share: how much of the work is
-    done, 0 while nobody knows. limit: whether that is a share of the most that is allowed, so that it may be over
-    sooner. most: the evaluations of one member that are allowed in all; what is tried first is given fewer. samplings:
-    integrals that are sampled; of the second one on, nobody knows how many are to come. told: is called after each
-    block of a large batch.
-    """
-
-    start: float = 0.0
-    evaluations: int = 0
-    share: float = 0.0
-    limit: bool = True
-    most: int = 0
-    samplings: int = 0
-    told: Callable[[], None] | None = None
-
-    def begin(self) -> None:
-        """Another evaluation begins."""
-        self.start, self.evaluations, self.share, self.limit, self.samplings = time.perf_counter(), 0, 0.0, True, 0
-
-    def spent(self, evaluations: int, most: int) -> None:
-        """So many evaluations are done, of so many that are allowed."""
-        self.evaluations = evaluations
-        if not self.samplings:
-            self.share = evaluations / most
-
-    def sampled(self, share: float, limit: bool) -> None:
-        """So much of the integral that is sampled is done; 0 begins it."""
-        self.samplings += share == 0
-        self.share, self.limit = (share, limit) if self.samplings == 1 else (0.0, True)
-
-
-_gauge: ContextVar[Gauge | None] = ContextVar("potto_gauge", default=None)
-
-
-@contextmanager
-def watching(gauge: Gauge) -> Iterator[Gauge]:
-    """In this block evaluations of this thread or task say how far they have come."""
-    token = _gauge.set(gauge)
-    try:
-        yield gauge
-    finally:
-        _gauge.reset(token)
-
-
-def watched() -> bool:
-    """Whether anyone wants to know how far evaluations have come."""
-    return _gauge.get() is not None
-
-
-@contextmanager
-def advancing() -> Iterator[Callable[[float, int], None]]:
-    """In this block a batch is evaluated in parts, and how far it is as a whole is told by who does that: the share of
-    its members, and the evaluations."""
-    gauge = _begun()
-    token = _gauge.set(None)
-
-    def told(share: float, evaluations: int) -> None:
-        if gauge is not None:
-            gauge.share, gauge.evaluations, gauge.limit = share, evaluations, False
-            if gauge.told is not None:
-                gauge.told()
-
-    try:
-        yield told
-    finally:
-        _gauge.reset(token)
-
-
-def _begun() -> Gauge | None:
-    gauge = _gauge.get()
-    if gauge is not None:
-        gauge.begin()
-    return gauge
-
+from potto.runtime.evaluation.gauge import Gauge, begun
 
 # A box takes as long as 1 to 5 evaluations. Of the catalogue's regions in three variables one takes 157,000 boxes, the
 # others less; where several waves cross it may be tens of millions.
@@ -146,7 +66,11 @@ class Record(Struct):
     seen: int = 0
     used: dict[tuple[str, str], Value] = {}
     costs: Costs | None = field(default_factory=costs.if_wanted)
-    gauge: Gauge | None = field(default_factory=_begun)
+    gauge: Gauge | None = field(default_factory=begun)
+
+    def follow(self) -> None:
+        """Tell whoever has begun to watch since this record was begun."""
+        self.gauge = self.gauge or begun()
 
     @property
     def spent(self) -> float:
