@@ -36,11 +36,8 @@ def _power_edges(base: Term, exponent: Term) -> Terms:
 
 
 def _power_exponents(base: Term, exponent: Term) -> Terms:
-    """The exponent of what varies as an exponential does; of others, such alone that have a layer where the base is
-    1."""
-    if not base.free:
-        return (mul(exponent, prim("log", prim("abs", base))),)
-    if not isinstance(exponent, Const) or abs(exponent.value) <= PLAIN_POWER:
+    """The exponent of it as an exponential; none where it is a power that polynomials can follow."""
+    if base.free and isinstance(exponent, Const) and abs(exponent.value) <= PLAIN_POWER:
         return ()
     return (mul(exponent, prim("log", prim("abs", base))),)
 

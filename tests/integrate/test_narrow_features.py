@@ -48,6 +48,19 @@ FEATURES: dict[str, tuple[str, Callable[[Any, Any], Any]]] = {
         "integral [0, 1] exp(x) + cos(x - t)^5e9 d(x)",
         lambda k, t: mp.e - 1 + mp.sqrt(mp.pi) * mp.gammaprod([2.5e9 + 0.5], [2.5e9 + 1]),
     ),
+    "a power by a parameter": (
+        "integral [0, 1] exp(x) + cos(x - t)^(8*k^2) d(x)",
+        lambda k, t: mp.e - 1 + mp.sqrt(mp.pi) * mp.gammaprod([4 * k * k + 0.5], [4 * k * k + 1]),
+    ),
+    "a comb, the first peak beside the end": (
+        "integral [0, 3] x + exp(k*(cos(10*x - t) - 1)) d(x)",
+        lambda k, t: 4.5 + 0 * t + mp.pi * mp.besseli(0, k) * mp.exp(-k),
+    ),
+    "a comb to infinity": (
+        "integral [0, inf] exp(-x)*(1 + exp(k*(cos(10*x - t) - 1))) d(x)",
+        lambda k, t: 1 + mp.exp(-t / 10) / (1 - mp.exp(-mp.pi / 5)) * across(
+            lambda s, t, k: mp.exp(k * (mp.cos(10 * s) - 1) - s), -mp.pi / 10, mp.pi / 10)(k, mp.mpc(0)),
+    ),
     "a power of 2": (
         "integral [0, 1] exp(x) + 2^(-(k*(x - t))^2) d(x)",
         lambda k, t: mp.e - 1 + mp.sqrt(mp.pi / mp.log(2)) / k,

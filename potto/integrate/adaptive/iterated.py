@@ -242,7 +242,10 @@ class Iteration(Struct):
             exponents, singular = self.plan.exponents[number], self.plan.singular[number]
             inner = self.plan.levels[number + 1 :]
             if exponents is not None:
-                rows += layer_rows(exponents, inner, level.variable, env, lo, hi, rows, batch, machine)
+                rows += layer_rows(
+                    exponents, inner, level.variable, env, lo, hi, rows, batch, machine,
+                    lambda: self.mattering(level, env, lo, hi, batch),
+                )  # fmt: skip
             if singular is not None:
                 rows += dip_rows(singular, inner, level.variable, env, lo, hi, batch, machine)
         return lo, hi, rows + shells(lo, hi, rows, batch), lost
@@ -290,6 +293,11 @@ class Iteration(Struct):
         if not (np.isinf(low).any() or np.isinf(high).any() or any(self.plan.levels[n].endless for n in further)):
             return {}, None
         return reaches(self.plan, env, (number, *further), (low, high), batch)
+
+    def mattering(self, level: LevelPlan, env: dict[str, Value], lo: Cell, hi: Cell, batch: int) -> tuple[Array, Array]:
+        """How much of the ranges of a variable matters, of infinite ones all where that is not known."""
+        known = self.ranges(level, env, lo, hi, batch)[0].get(level.variable)
+        return known or (as_array(lo.v, batch), as_array(hi.v, batch))
 
     def sides_of(self, scene: IteratedVariable, seg: Segments) -> Settled:
         """The sides of all surfaces decided so far: those of this variable from the segments' middles."""

@@ -18,7 +18,7 @@ from msgspec import Struct
 from potto.core.terms import Term
 from potto.integrate.decomposition.lines import Watched, apart, box_of, on_lines, watched
 from potto.integrate.decomposition.meetings import Row, as_array
-from potto.integrate.decomposition.turns import Span, cells_of, span_of, turns
+from potto.integrate.decomposition.turns import Matters, Span, cells_of, span_of, turns
 from potto.integrate.levels import HINT, LevelPlan
 from potto.integrate.pieces import Evaluator
 from potto.integrate.rules.intervals import Interval, enclosure
@@ -44,19 +44,19 @@ def exponents_of(body: Term, variable: str, known: frozenset[str]) -> Watched | 
 
 def layer_rows(
     exponents: Watched, inner: Sequence[LevelPlan], variable: str, env: Mapping[str, Value], lo: Cell, hi: Cell,
-    rows: Sequence[Row], batch: int, machine: Evaluator,
+    rows: Sequence[Row], batch: int, machine: Evaluator, matters: Matters,
 ) -> list[Row]:  # fmt: skip
     """Rows beside both bounds, the places of other rows, and those at which exponents turn, for members on whose ranges
     an exponent changes much.
 
-    inner: the variables further in."""
+    inner: the variables further in. matters: finds how much of the ranges, some infinite, does."""
     ends = np.stack([as_array(end.v, batch) for end in (lo, hi)])
     low, high = ends.min(axis=0), ends.max(axis=0)
     there = np.flatnonzero(high > low)
     if not there.size or not _steep_somewhere(exponents, inner, variable, env, (low[there].min(), high[there].max())):
         return []
     hints = [as_array(row.x, batch)[there] for row in rows if row.cut == HINT]
-    span = span_of(low[there], high[there], hints)
+    span = span_of(low[there], high[there], hints, lambda: tuple(end[there] for end in matters()))
     lines = _Lines(exponents, inner, variable, env, machine, there, span)
     lines = lines.pick(np.flatnonzero(lines.steep()))
     if not lines.members.size:
