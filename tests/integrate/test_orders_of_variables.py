@@ -113,3 +113,13 @@ def test_no_order_goes_on_long_before_others_are_tried() -> None:
         assert abs(answer.value - t**2 * (3 - 2 * math.log(t)) / 4) <= answer.error <= 1e-13
         assert abs(answer.tangent - t * (1 - math.log(t))) <= answer.tangent_error <= 1e-13
         assert answer.evals <= most
+
+
+def test_a_hyperboloid_is_cut_across_its_axis() -> None:
+    """Along another variable its sections have saddles. By hand: circles of radius sqrt(z^2 + t)."""
+    f = potto.deriv(potto.compile(
+        "def f(t) integral ([-2, 2], [-2, 2], [-1, 1]) [x^2 + y^2 - z^2 < t] d(x, y, z)").f)  # fmt: skip
+    answer = f((0.25, 1.0))
+    assert abs(answer.value - PI * (2 / 3 + 0.5)) <= answer.error <= 1e-10
+    assert abs(answer.tangent - 2 * PI) <= answer.tangent_error <= 1e-10
+    assert answer.evals <= 50_000

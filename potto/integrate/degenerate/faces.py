@@ -159,9 +159,10 @@ def _running_along(scene: IteratedVariable, owner: Ints, x: Array, off: Array) -
     many = np.tile(owner, shape[0] * shape[1])
     here = gather({n: pad(still(v), 1) for n, v in scene.env.items()}, many)
     here[scene.level.variable] = Cell(np.tile(there.ravel(), shape[0]), None, (1.0,))
-    fraction, off = np.repeat(FRACTIONS, there.size), np.where(np.isfinite(off), off, 0.0) + EPS * np.abs(x)
+    off = np.where(np.isfinite(off), off, 0.0) + EPS * np.abs(x)
     along, simple = [], []
-    for level in further:
+    for number, level in enumerate(further):  # never on a diagonal, on which y^2 - z^2 is 0
+        fraction = np.repeat(np.roll(FRACTIONS, number), there.size)
         lo, hi = (np.broadcast_to(cell.v, many.shape) for cell in numbers_at(level.bounds, quiet, here))
         here[level.variable] = Cell(lo + fraction * (hi - lo), None, (None,))
         if any(level.turned) or not np.isfinite(lo + hi).all():
