@@ -9,6 +9,7 @@ from __future__ import annotations
 import inspect
 import os.path
 import re
+from functools import cache
 
 from potto.calculus.explanation.readable import formula
 from potto.checking.check import definition_diagnostics
@@ -136,6 +137,7 @@ def module_markdown(db: Database, file: str, dotted: str) -> str:
 # Builtins and measures
 
 
+@cache
 def builtin_markdown(name: str) -> str:
     """A builtin: its type, what it gives, and its derivative rule."""
     special = SPECIALS.get(name)
@@ -201,6 +203,7 @@ def _equation(kink: Term) -> str:
     return format_equation(simplify(kink))
 
 
+@cache
 def measure_markdown(name: str) -> str:
     """A measure: its parameters, density and moments; of one that is made of measures, how."""
     if name in COMPOSITIONS:
