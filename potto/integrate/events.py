@@ -232,7 +232,10 @@ NOT_A_NUMBER = Shortfall(
     "look for a builtin that is used where it is not defined, and guard it with a condition",
 )
 INFINITE = Shortfall("the integral is infinite, or beyond what numbers can hold", POLE)
-BOUNDLESS = Shortfall("the value is infinite here", "move a parameter a little: beside this place it is finite")
+BOUNDLESS = Shortfall(
+    "the value is infinite here, or beyond what numbers can hold",
+    "move a parameter a little: beside a pole it is finite; or ask for its logarithm",
+)
 STEEP = Shortfall("the derivative is infinite here", "move a parameter a little: beside this place it is finite")
 NO_BOUND = Shortfall("the error is not known")
 UNBOUNDED_SAMPLES = Shortfall(

@@ -303,13 +303,14 @@ def _drawn(record: Record) -> bool:
 
 
 def _blamed(found: Shortfalls, record: Record, shape: tuple[int, ...], infinite: Shortfall) -> Shortfalls:
-    """The reasons, in which no integral is to blame for 1/0, and infinity times 0, where all of them are finite.
+    """The reasons, in which no integral is to blame for 1/0, exp(3000), and infinity times 0, where all of them are
+    finite.
 
-    infinite: what is said instead; nothing where there is no integral at all.
+    infinite: what is said instead.
     """
     finite = record.allowed.over(shape).finite
     others: Shortfalls = {}
-    for why, instead in ((INFINITE, infinite if record.methods else None), (NO_VALUE, NOT_A_NUMBER)):
+    for why, instead in ((INFINITE, infinite), (NO_VALUE, NOT_A_NUMBER)):
         if why not in found:
             continue
         where = found.pop(why)
@@ -317,7 +318,7 @@ def _blamed(found: Shortfalls, record: Record, shape: tuple[int, ...], infinite:
             (np.logical_and(where, np.logical_not(finite)), why),
             (np.logical_and(where, finite), instead),
         ):
-            if told is not None and np.any(here):
+            if np.any(here):
                 merged(others, {told: here if np.ndim(where) else True})
     merged(others, found)
     return others

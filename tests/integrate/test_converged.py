@@ -115,7 +115,7 @@ def test_of_an_infinite_value_no_finite_integral_is_to_blame() -> None:
     """It is said of the value, and of an integral where that is infinite."""
     f = potto.compile("def f(x, t) 1/x + integral [0, 1] [y < t]*exp(y) d(y)").f
     alone, batch = f(0.0, 0.5), f(np.array([0.0, 1.0]), 0.5)
-    assert alone.value == INF and alone.reasons == ("the value is infinite here",)
+    assert alone.value == INF and alone.reasons == ("the value is infinite here, or beyond what numbers can hold",)
     assert batch.reasons_of(0) == alone.reasons and batch.member_converged.tolist() == [False, True]
     assert abs(batch.value[1] - math.exp(0.5)) <= batch.error[1] <= 1e-12
     slope = potto.deriv(potto.compile("def f(x, t) sqrt(x) + integral [0, 1] [y < t]*exp(y) d(y)").f)((0.0, 1.0), 0.5)
@@ -124,6 +124,17 @@ def test_of_an_infinite_value_no_finite_integral_is_to_blame() -> None:
     assert none.reasons == ("the value is not a number",)
     pole = potto.compile("def f(x) integral [0, 1] x/y d(y)").f
     assert pole(1.0).value == INF and "integral" in pole(1.0).reasons[0] and not pole(1.0).converged
+
+
+@pytest.mark.parametrize("body", ["exp(3000*t)", "1/(t - 1)", "-log(t - 1)"])
+def test_what_is_infinite_without_any_integral_has_not_converged_either(body: str) -> None:
+    """A pole, and what overflows, which is no infinity at all. The constant `inf` is known to be one."""
+    f = potto.compile(f"def f(t) {body}").f
+    alone, batch, slope = f(1.0), f(np.array([1.0, 0.0])), potto.deriv(f)((1.0, 1.0))
+    assert alone.value == alone.error == INF and not alone.converged and "infinite" in alone.reasons[0]
+    assert not batch.member_converged[0] and batch.reasons_of(0) == alone.reasons
+    assert slope.value == INF and not slope.converged and alone.reasons[0] in slope.reasons
+    assert potto.compile("def f(t) inf").f(1.0).converged
 
 
 def test_what_was_asked_for_counts() -> None:
