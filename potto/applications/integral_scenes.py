@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Mapping
+from contextlib import suppress
 
 import numpy as np
 from msgspec import Struct
@@ -25,12 +26,13 @@ from potto.ide.display.scenes import Scene, SceneParameter, scene
 from potto.kernels.errors import wrong_call
 from potto.modules import DefinitionTarget, resolve
 from potto.python.terms import TermFunction
+from potto.runtime.evaluation.gauge import Overtime, patient
 from potto.source import Span
 from potto.syntax import nodes
 from potto.types import groups_of, interface
 
 UNSAID = 0.5  # what a number is that nobody gives
-PATIENCE = 0.1  # seconds: numbers that take longer wait until nothing is dragged any more, and the picture goes on
+PATIENCE = 0.1  # seconds: numbers that take longer are given up until nothing is dragged any more; the picture goes on
 AGAIN = 0.25  # seconds between numbers that do not fit into a frame
 
 
@@ -226,12 +228,15 @@ class IntegralScene:
         took, since = self._took.get(key, 0.0), start - self._told.get(key, -math.inf)
         if quick and took > FRAME - seconds and (took > PATIENCE or since <= AGAIN):
             return None
-        found = numbers(self.regions(wrt)[which], self._compiled, values, wrt, ghost, quick)
+        found = None
+        with suppress(Overtime), patient(lambda: quick and time.perf_counter() - start > PATIENCE):
+            found = numbers(self.regions(wrt)[which], self._compiled, values, wrt, ghost, quick)
         self._told[key] = time.perf_counter()
         if quick:
             self._took[key] = self._told[key] - start
-        else:
+        elif found is not None:
             self._fine = counted, found
+            self._took.pop(key, None)  # when it is dragged again they are tried again
         return found
 
     def _compiled(self, term: Lam) -> TermFunction:
