@@ -308,12 +308,11 @@ def _blamed(found: Shortfalls, record: Record, shape: tuple[int, ...], infinite:
 
     infinite: what is said instead.
     """
-    finite = record.allowed.over(shape).finite
     others: Shortfalls = {}
     for why, instead in ((INFINITE, infinite), (NO_VALUE, NOT_A_NUMBER)):
         if why not in found:
             continue
-        where = found.pop(why)
+        where, finite = found.pop(why), record.allowed.over(shape).finite
         for here, told in (
             (np.logical_and(where, np.logical_not(finite)), why),
             (np.logical_and(where, finite), instead),

@@ -14,7 +14,7 @@ from msgspec.structs import replace
 from potto.core.terms import Integral
 from potto.integrate.events import Degenerate, Shortfall, SurfaceFold, TwoSided, Unsearched
 from potto.integrate.pieces import Sums
-from potto.kernels.cells import Array
+from potto.kernels.cells import Array, Bools
 from potto.runtime.answers.convergence import ONLY_ROUNDED, missing
 from potto.runtime.integration.methods.attempts import attempted, uncertainty
 from potto.runtime.integration.methods.choices import orders
@@ -137,12 +137,16 @@ def in_another_order(problem: Problem, order: Integral, sums: Sums) -> Sums:
     node further out misplaces it; along another variable it is flat.
     """
     machine = problem.machine
-    spoilt = ((sums.et > machine.rtol * np.abs(sums.t)) & (sums.et > STEEP * sums.e[:, None])).any(axis=(0, 1))
-    if spoilt.any():
-        spoilt &= ~np.isinf(sums.et).any(axis=(0, 1)) & missing(problem.term, sums, machine.settings, problem.env)
-    if problem.events.every(Shortfall) or not spoilt.any() or spoilt.sum() > MOST_SPOILT:
+    rough = np.flatnonzero((sums.et > machine.rtol * np.abs(sums.t)).any(axis=(0, 1)))
+    if not rough.size or problem.events.every(Shortfall):
         return sums
-    index = np.nonzero(spoilt)[0]
+    steep = _steep(sums.pick(rough))
+    if not steep.any():
+        return sums
+    index = rough[steep]
+    index = index[missing(problem.term, sums, machine.settings, problem.env)[index]]
+    if not 0 < index.size <= MOST_SPOILT:
+        return sums
     few = problem.picked(index)
     for other in itertools.islice(orders(order), 1, None):
         part = few.apart()
@@ -151,3 +155,11 @@ def in_another_order(problem: Problem, order: Integral, sums: Sums) -> Sums:
         sums.t[:, :, index] = np.where(better, found.t, sums.t[:, :, index])
         sums.et[:, :, index] = np.where(better, found.et, sums.et[:, :, index])
     return sums
+
+
+def _steep(sums: Sums) -> Bools:
+    """For which members rounding puts a derivative far more off than the value, also as a part of what it is: of the tip
+    of a sliver, which has hardly any of both, it leaves as little in any order."""
+    value, error, size = np.abs(sums.v[:, None]), sums.e[:, None], np.abs(sums.t)
+    worse = (sums.et > STEEP * error) & ((sums.et * value > STEEP * error * size) | (value == 0))
+    return np.asarray(worse.any(axis=(0, 1)) & ~np.isinf(sums.et).any(axis=(0, 1)))
