@@ -199,6 +199,18 @@ def test_one_member_that_rounding_spoils_is_looked_at_along_another_variable(mon
     held(answer, corners, px, py, 0.5)
 
 
+def test_a_sliver_among_thousands_is_left_as_rules_have_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Along cuts it takes as long as all others together. Its bar holds, and it is told that it is not what was asked
+    for."""
+    cut = counted_cuts(monkeypatch)
+    random = np.random.default_rng(7)
+    corners = np.concatenate((np.array([SLIVER[:6]]).T, turned_left(random.random((6, 2000)))), axis=1)
+    px, py = np.concatenate((np.array([SLIVER[6:]]).T, 0.5 * random.random((2, 2000))), axis=1)
+    answer = potto.grad(potto.compile(TRIANGLE).covered, CORNERS)(px, py, 0.5, *corners)
+    assert cut == [] and not answer.member_converged[0] and answer.member_converged[1:].mean() > 0.999
+    held(answer, corners[:, :50], px[:50], py[:50], 0.5)
+
+
 def test_nobody_asks_for_more_than_a_polynomial_between_planes_has(monkeypatch: pytest.MonkeyPatch) -> None:
     """Rules are exact for it: a second time with 32 times the accuracy asked for took as long as the first one, and
     told the same."""

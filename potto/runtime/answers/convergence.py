@@ -8,7 +8,7 @@ it: what its error may be then, `allowances` says.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from potto.core.terms import Integral
+from potto.integrate.columns import distinct
 from potto.integrate.events import (
     CANCELLED,
     INFINITE,
@@ -30,7 +31,7 @@ from potto.integrate.events import (
     UNBOUNDED_SAMPLES,
     Shortfall,
 )
-from potto.integrate.pieces import Sums, added_up, together
+from potto.integrate.pieces import Sums, added_up, imprecise, rough_places, together
 from potto.kernels.cells import Array, Bools, Ints, Number, Value
 from potto.projects.settings import Settings
 from potto.runtime.answers.allowances import Allowed, allowance
@@ -39,8 +40,6 @@ from potto.runtime.answers.allowances import Allowed, allowance
 SPECK = 1e-15
 # From which part of a value on an error is more than rounding, and up to which it is nothing else.
 LOST, ONLY_ROUNDED = 0.1, 1e-6
-# Numbers of a batch that are looked at together.
-AT_ONCE = 1 << 14
 
 # Why answers are not as accurate as asked for, and of which members of a batch: a mask, or True for all of them.
 Shortfalls = dict[Shortfall, Any]
@@ -51,29 +50,33 @@ def missing(term: Integral, sums: Sums, settings: Settings, env: dict[str, Value
     as was asked for, and what is off is not a speck beside what the others come to. Those that go into one sum are
     measured by it."""
     out: Bools = np.zeros(sums.v.shape[-1], dtype=bool)
-    whole = together(env, sums.v)
-    if whole is sums.v and precise(sums.v, sums.e, settings.rtol) and precise(sums.t, sums.et, settings.rtol):
-        return out  # as mostly, whatever else would do
-    within: Array | None = None
-    for number, error in ((whole, sums.e), (sums.t, sums.et)):
-        size = np.abs(number)
-        fine = error <= np.maximum(settings.atol, settings.rtol * size)
-        fine &= np.isfinite(error)  # of what may be infinite, and may be anything, nothing is known yet
-        rest = np.flatnonzero(~fine.reshape(-1, out.size).all(axis=0))
+    whole, rest = together(env, sums.v), np.arange(out.size)
+    if whole is sums.v:  # each by itself: mostly all are precise, whatever else would do
+        rest = distinct(np.concatenate([
+            imprecise(*pair, settings.rtol) for pair in ((sums.v, sums.e), (sums.t, sums.et))
+        ]))  # fmt: skip
         if not rest.size:
-            continue
-        if within is None:
-            gross = None if sums.gross is None else together(env, sums.gross)
-            all_of_it = allowance(term, replace(sums, v=whole, gross=gross), settings.rtol)
-            within = np.broadcast_to(all_of_it, out.shape)
-        speck = SPECK * np.max(size, axis=-1, keepdims=True, initial=0.0, where=np.isfinite(size))
-        few = error.take(rest, -1)
-        known = fine.take(rest, -1) | (few <= np.maximum(within.take(rest), speck))
-        if number is sums.t:
-            known |= added_up(env, number, error, settings.rtol).take(rest, -1)
-        known &= np.isfinite(few)
+            return out
+    few, gross = sums.pick(rest), None if sums.gross is None else together(env, sums.gross).take(rest, -1)
+    own = whole.take(rest, -1)
+    within = np.broadcast_to(allowance(term, replace(few, v=own, gross=gross), settings.rtol), rest.shape)
+    for number, error, every in ((own, few.e, whole), (few.t, few.et, sums.t)):
+        known = error <= np.maximum(settings.atol, settings.rtol * np.abs(number))
+        known |= error <= np.maximum(within, SPECK * _largest(every))
+        if number is few.t:
+            known |= added_up(env, sums.t, sums.et, settings.rtol).take(rest, -1)
+        known &= np.isfinite(error)  # of what may be infinite, and may be anything, nothing is known yet
         out[rest] |= ~known.reshape(-1, rest.size).all(axis=0)
     return out
+
+
+def _largest(numbers: Array) -> Array:
+    """Of numbers (..., B) the largest finite ones without regard to sign, (..., 1)."""
+    found = np.maximum(np.abs(numbers.max(axis=-1, initial=0.0)), np.abs(numbers.min(axis=-1, initial=0.0)))
+    if not np.isfinite(found).all():
+        size = np.abs(numbers)
+        found = np.max(size, axis=-1, initial=0.0, where=np.isfinite(size))
+    return np.asarray(found[..., None])
 
 
 def precise(numbers: Number | None, errors: Number | None, rtol: float) -> bool:
@@ -82,26 +85,7 @@ def precise(numbers: Number | None, errors: Number | None, rtol: float) -> bool:
         return False
     if numbers.__class__ is float and errors.__class__ is float:
         return errors <= rtol * abs(numbers) < np.inf
-    return next(_imprecise(numbers, errors, rtol), None) is None
-
-
-def _imprecise(numbers: Number, errors: Number, rtol: float) -> Iterator[Ints]:
-    """The places of numbers that are not precise, in order: some at a time, whose sizes stay in the cache. In memory
-    they take six times as long."""
-    if np.shape(numbers) != np.shape(errors):
-        numbers, errors = np.broadcast_arrays(numbers, errors)
-    flat, off = np.reshape(numbers, -1), np.reshape(errors, -1)  # copies, where they have gaps: never of large batches
-    room = np.empty(min(flat.size, AT_ONCE))
-    for start in range(0, flat.size, AT_ONCE):
-        some = flat[start : start + AT_ONCE]
-        size = np.abs(some, out=room[: some.size])
-        finite = size.max() < np.inf
-        size *= rtol
-        good = off[start : start + AT_ONCE] <= size
-        if not finite:
-            good &= np.isfinite(some)
-        if not good.all():
-            yield start + np.flatnonzero(~good)
+    return next(rough_places(numbers, errors, rtol), None) is None
 
 
 class Rough(Struct, frozen=True):
@@ -137,7 +121,7 @@ def rough_of(pairs: Iterable[tuple[Number, Number]], rtol: float) -> list[Rough]
     for number, error in pairs:
         if number.__class__ is float and precise(number, error, rtol):  # numpy takes its time over a single number
             continue
-        places = list(_imprecise(number, error, rtol))
+        places = list(rough_places(number, error, rtol))
         if places:
             found.append(Rough(number, error, np.concatenate(places)))
     return found

@@ -22,7 +22,7 @@ from potto.integrate.fixed.cells.proved_shapes import proved_rules
 from potto.integrate.fixed.cells.topologies import Alike, topologies
 from potto.integrate.fixed.steps.step_batches import by_cells
 from potto.integrate.fixed.straight import MOST_CHOICES, StraightIntegral, in_rows
-from potto.integrate.pieces import Evaluator, Shaped, Sums, added_up, gather, numbers_at, together
+from potto.integrate.pieces import Evaluator, Shaped, Sums, added_up, gather, imprecise, numbers_at, together
 from potto.kernels.cells import Array, Bools, Cell, Ints, Value
 
 # Nodes per variable that are tried, one after the other.
@@ -95,14 +95,14 @@ def _of_one_form(
                 return None
     if not done.any():
         return None
-    known, enough = _fine(machine, env, total)
+    number, rounding, gross, truncated = total
+    error = truncated + rounding
+    known, enough = _fine(machine, env, total, error)
     short = done & enough & ~known & (batch > 1)  # for one there are other ways
     done &= known & enough
     settled = done | short
     if not settled.any():
         return None
-    number, rounding, gross, truncated = total
-    error = np.add(truncated, rounding, out=truncated)
     added = np.stack((gross[0], gross[1:].max(axis=0, initial=0.0)))
     if not settled.all():
         left = np.flatnonzero(~settled)
@@ -112,21 +112,22 @@ def _of_one_form(
     return Shaped(done, short, found)
 
 
-def _fine(machine: Evaluator, env: dict[str, Value], total: Array) -> tuple[Bools, Bools]:
+def _fine(machine: Evaluator, env: dict[str, Value], total: Array, error: Array) -> tuple[Bools, Bools]:
     """Which members are known as accurately as was asked for despite rounding, and for which the rule has nodes enough,
-    by what was found for each: (4, 1 + k, B). Over large batches it is memory that takes time: what does for most is
-    asked first."""
+    by what was found for each, (4, 1 + k, B), and how far off that is. Over large batches it is memory that takes time:
+    what does for most is asked first."""
     number, rounding, gross, truncated = total
-    whole = np.abs(number)
-    whole[0] = np.abs(together(env, number[0]))
-    asked = np.maximum(machine.atol, np.multiply(whole, machine.rtol, out=whole), out=whole)
-    fine = 2.0 * (truncated + rounding) <= asked
     known, enough = np.ones((2, number.shape[1]), dtype=bool)
-    rest = np.flatnonzero(~fine.all(axis=0))
+    value = number[0]
+    whole = together(env, value)
+    alone = whole is value
+    rest = imprecise(number, error, 0.5 * machine.rtol) if alone else np.arange(value.size)
     if not rest.size:
         return known, enough
-    added = together(env, gross.max(axis=0)).take(rest)
-    asked, cut, off = (part.take(rest, 1) for part in (asked, truncated, rounding))
+    size, cut, off = (part.take(rest, 1) for part in (number, truncated, rounding))
+    size[0] = whole.take(rest)
+    asked = np.maximum(machine.atol, machine.rtol * np.abs(size))
+    added = gross.take(rest, 1).max(axis=0) if alone else together(env, gross.max(axis=0))
     if number.shape[1] == 1:  # for one there are other ways
         added[:] = 0.0
     most, left = CANCELS * added, min(machine.rtol, ROUNDED) * np.minimum(added, 1.0)

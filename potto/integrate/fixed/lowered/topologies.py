@@ -94,8 +94,8 @@ class LoweredTopologies(Struct, frozen=True, dict=True, eq=False):
         members, between, sides = np.concatenate(found, axis=1)
         fine: Bools = np.asarray(plain[:batch] > 0)
         if not fine.all():
-            kept = fine.take(members)
-            members, between, sides = members[kept], between[kept], sides[kept]
+            kept = np.flatnonzero(fine.take(members))
+            members, between, sides = members.take(kept), between.take(kept), sides.take(kept)
         return Found(fine, between, members, sides)
 
 

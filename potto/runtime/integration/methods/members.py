@@ -34,8 +34,8 @@ FEW_MEMBERS = 10
 PROVED = 4
 # Up to how many are done one by one where somebody has met something and nobody knows who; more are halved.
 MOST_UNKNOWN = 64
-# Up to which part of a batch is left as rules have it where rounding spoils them all: one member by itself takes as long
-# as ten thousand, for an error that is 0.2 to 0.7 of what it was.
+# Up to which part of a batch is left as rules have it where rounding spoils them all: one member by itself takes as
+# long as ten thousand, for an error that is 0.2 to 0.7 of what it was.
 RARE = 1e-3
 # For how many members without the accuracy asked for it is tried what can be done for one.
 MOST_ROUGH = 256

@@ -13,7 +13,7 @@ from msgspec.structs import replace
 
 from potto.core.terms import Integral
 from potto.integrate.events import Degenerate, Shortfall, SurfaceFold, TwoSided, Unsearched
-from potto.integrate.pieces import Sums
+from potto.integrate.pieces import Sums, imprecise
 from potto.kernels.cells import Array, Bools
 from potto.runtime.answers.convergence import ONLY_ROUNDED, missing
 from potto.runtime.integration.methods.attempts import attempted, uncertainty
@@ -137,7 +137,7 @@ def in_another_order(problem: Problem, order: Integral, sums: Sums) -> Sums:
     node further out misplaces it; along another variable it is flat.
     """
     machine = problem.machine
-    rough = np.flatnonzero((sums.et > machine.rtol * np.abs(sums.t)).any(axis=(0, 1)))
+    rough = imprecise(sums.t, sums.et, machine.rtol)
     if not rough.size or problem.events.every(Shortfall):
         return sums
     steep = _steep(sums.pick(rough))
@@ -158,8 +158,8 @@ def in_another_order(problem: Problem, order: Integral, sums: Sums) -> Sums:
 
 
 def _steep(sums: Sums) -> Bools:
-    """For which members rounding puts a derivative far more off than the value, also as a part of what it is: of the tip
-    of a sliver, which has hardly any of both, it leaves as little in any order."""
+    """For which members rounding puts a derivative far more off than the value, also as a part of what it is: of the
+    tip of a sliver, which has hardly any of both, it leaves as little in any order."""
     value, error, size = np.abs(sums.v[:, None]), sums.e[:, None], np.abs(sums.t)
     worse = (sums.et > STEEP * error) & ((sums.et * value > STEEP * error * size) | (value == 0))
     return np.asarray(worse.any(axis=(0, 1)) & ~np.isinf(sums.et).any(axis=(0, 1)))
