@@ -1,11 +1,11 @@
 """What passes between the parts of the integrator: sums over a batch, pieces under refinement, environments.
 
-Owns `Sums`, `Shaped`, `Pieces` and `Evaluator`, the integrator's view of the machine; `imprecise`.
+Owns `Sums`, `Shaped`, `Pieces` and `Evaluator`, the integrator's view of the machine.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
 from typing import Any, Protocol
 
@@ -13,7 +13,7 @@ import numpy as np
 from msgspec import Struct, field
 
 from potto.core.terms import Lam
-from potto.integrate.columns import Columns, distinct, joined
+from potto.integrate.columns import Columns, joined
 from potto.integrate.costs import Costs
 from potto.integrate.decomposition.root_isolation import Isolated
 from potto.integrate.events import Event, Events, Members
@@ -25,7 +25,6 @@ from potto.kernels.written import Kernel
 from potto.projects.settings import Settings
 
 STRAY = 8
-AT_ONCE = 1 << 14  # numbers of a batch that are looked at together
 TELLING = 4  # nodes, from which on values tell where a singularity is; a polynomial may need fewer
 
 
@@ -324,31 +323,6 @@ def added_up(env: dict[str, Value], tangents: Array, errors: Array, rtol: float)
     if OF not in env:
         return np.zeros(tangents.shape, dtype=bool)
     return together(env, errors, OF) <= rtol * together(env, np.abs(tangents), OF)
-
-
-def rough_places(numbers: Number, errors: Number, rtol: float) -> Iterator[Ints]:
-    """The places of numbers that are not precise, in order: some at a time, whose sizes stay in the cache. In memory
-    they take six times as long."""
-    if np.shape(numbers) != np.shape(errors):
-        numbers, errors = np.broadcast_arrays(numbers, errors)
-    flat, off = np.reshape(numbers, -1), np.reshape(errors, -1)  # copies, where they have gaps: never of large batches
-    room = np.empty(min(flat.size, AT_ONCE))
-    for start in range(0, flat.size, AT_ONCE):
-        some = flat[start : start + AT_ONCE]
-        size = np.abs(some, out=room[: some.size])
-        finite = size.max() < np.inf
-        size *= rtol
-        good = off[start : start + AT_ONCE] <= size
-        if not finite:
-            good &= np.isfinite(some)
-        if not good.all():
-            yield start + np.flatnonzero(~good)
-
-
-def imprecise(numbers: Array, errors: Array, rtol: float) -> Ints:
-    """The members of a batch, in order, of whose numbers (..., B) not all are precise."""
-    places = list(rough_places(numbers, errors, rtol))
-    return distinct(np.concatenate(places) % numbers.shape[-1]) if places else np.zeros(0, dtype=np.int64)
 
 
 def column(env: dict[str, Value]) -> dict[str, Value]:

@@ -31,7 +31,8 @@ from potto.integrate.events import (
     UNBOUNDED_SAMPLES,
     Shortfall,
 )
-from potto.integrate.pieces import Sums, added_up, imprecise, rough_places, together
+from potto.integrate.pieces import Sums, added_up, together
+from potto.integrate.precision import imprecise, rough_places
 from potto.kernels.cells import Array, Bools, Ints, Number, Value
 from potto.projects.settings import Settings
 from potto.runtime.answers.allowances import Allowed, allowance

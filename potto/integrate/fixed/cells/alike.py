@@ -22,7 +22,8 @@ from potto.integrate.fixed.cells.proved_shapes import proved_rules
 from potto.integrate.fixed.cells.topologies import Alike, topologies
 from potto.integrate.fixed.steps.step_batches import by_cells
 from potto.integrate.fixed.straight import MOST_CHOICES, StraightIntegral, in_rows
-from potto.integrate.pieces import Evaluator, Shaped, Sums, added_up, gather, imprecise, numbers_at, together
+from potto.integrate.pieces import Evaluator, Shaped, Sums, added_up, gather, numbers_at, together
+from potto.integrate.precision import imprecise
 from potto.kernels.cells import Array, Bools, Cell, Ints, Value
 
 # Nodes per variable that are tried, one after the other.

@@ -13,7 +13,8 @@ from msgspec.structs import replace
 
 from potto.core.terms import Integral
 from potto.integrate.events import Degenerate, Shortfall, SurfaceFold, TwoSided, Unsearched
-from potto.integrate.pieces import Sums, imprecise
+from potto.integrate.pieces import Sums
+from potto.integrate.precision import imprecise
 from potto.kernels.cells import Array, Bools
 from potto.runtime.answers.convergence import ONLY_ROUNDED, missing
 from potto.runtime.integration.methods.attempts import attempted, uncertainty
