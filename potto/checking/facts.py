@@ -169,7 +169,7 @@ def derivative_facts(db: Database, file: str, name: str) -> DerivativeFacts | No
         name,
         format_type(type),
         derived,
-        tuple(_surfaces(db, whole, notation)),
+        tuple(_surfaces(db, whole, notation)) or _of_calls(found),
         tuple(map(_integral_facts, found.integrals)),
         None if found.alone else _body_facts(term, found, notation),
         found.tangent,
@@ -177,6 +177,12 @@ def derivative_facts(db: Database, file: str, name: str) -> DerivativeFacts | No
         tuple(sorted(found.tangents)),
         found.divisors,
     )
+
+
+def _of_calls(found: DerivativeText) -> tuple[str, ...]:
+    """The surfaces that a function has through the functions that it calls."""
+    there = (*found.surfaces, *(surface for item in found.integrals for surface in item.surfaces))
+    return tuple(dict.fromkeys(surface.equation for surface in there))
 
 
 def _unless_recursive(db: Database, target: Global) -> Term | None:

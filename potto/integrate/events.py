@@ -253,7 +253,7 @@ CANCELLED = Shortfall(
     "beside its parts it is 0; `--atol` says which error of it is small enough",
 )
 ROUNDED = Shortfall(
-    "rounding limits the accuracy", f"more evaluations cannot help, the numbers have no more digits: {LESS}"
+    "rounding limits the accuracy", f"more evaluations cannot help: double precision has no more digits: {LESS}"
 )
 TOO_LARGE = Shortfall("the error estimate is too large")
 # Of this a reader need not be warned: that answer came with its error.

@@ -14,7 +14,7 @@ from potto.data.mistakes import UNREADABLE, DataMistake
 from potto.data.values import Shape
 from potto.query import Database, query
 
-_NO_FILES = "it is a text by itself, without a folder: save it in a file, or give the data as an argument"
+_NO_FILES = "this program is not in a folder: save it in a file, or give the data as an argument"
 
 
 class DataFile(Struct, frozen=True):

@@ -111,7 +111,7 @@ def whole_bounds(inference: Inference, over: nodes.Range) -> None:
             near = (math.floor(value), math.ceil(value)) if abs(value) < 1e9 else ()
             inference.report(kinds.NOT_WHOLE(
                 bound.span, f"a range goes through whole numbers, but its {which} one is {value:g}",
-                label="not a whole number", help="`floor` and `ceil` make a whole number of another one",
+                label="not a whole number", help="`floor` and `ceil` round to a whole number",
                 suggestions=tuple(suggest(bound.span, str(number)) for number in near),
             ))  # fmt: skip
 

@@ -60,7 +60,7 @@ def image(inference: Inference, node: nodes.Apply, types: list[Type]) -> Type:
 
 def _several(inference: Inference, size: Type, expr: nodes.Expr, name: str) -> None:
     if isinstance(size, Count) and size.number < 1:
-        inference.report(kinds.SIZES(expr.span, f"`{name}` needs a place at least", label="no elements"))
+        inference.report(kinds.SIZES(expr.span, f"`{name}` needs at least one place", label="no elements"))
 
 
 def _rising(inference: Inference, places: nodes.Expr) -> None:
@@ -72,7 +72,7 @@ def _rising(inference: Inference, places: nodes.Expr) -> None:
         first, second = number(before), number(place)
         if first is not None and second is not None and not first < second:
             inference.report(kinds.NO_RISE(
-                place.span, f"`interp` needs places that rise, but {second:g} follows {first:g}",
+                place.span, f"`interp` needs increasing places, but {second:g} follows {first:g}",
                 label="not above the one before", related=(Related(before.span, "the place before"),),
                 help="sort the places, with the values beside them",
             ))  # fmt: skip

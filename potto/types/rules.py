@@ -223,7 +223,7 @@ def product_of_deltas(expr: nodes.Expr) -> Diagnostic:
         expr.span,
         "the product of two deltas on the same surface has no meaning",
         label="the same delta again",
-        help="a delta may stand as a factor once",
+        help="a delta may be a factor only once",
     )
 
 

@@ -276,7 +276,7 @@ def moved(a) integral [0, 2] interp([0, a, 2], [0, 1, 0], x) d(x)
     assert abs(program.squares(0.55) - 30.5) < 1e-12
     assert abs(program.moved(0.5) - 1) < 1e-12  # a tent of base 2 and height 1, wherever its peak
     for call in (lambda: program.flat(0.5), lambda: program.moved(2.0)):
-        with pytest.raises(potto.PottoError, match="`interp` needs places that rise"):
+        with pytest.raises(potto.PottoError, match="`interp` needs increasing places"):
             call()
 
 

@@ -113,6 +113,13 @@ def test_surfaces_are_written_alike(integrand: str, equation: str) -> None:
     assert [surface["surface"] for surface in stats["surfaces"]] == [equation]
 
 
+def test_the_surfaces_of_functions_that_are_called_are_told() -> None:
+    library = Library()
+    file = library.put("<text>", "def f(t) integral [0, 1] [x < t] d(x)\ndef g(s) f(s)^2\n")
+    facts = derivative_facts(library.db, file, "g")
+    assert facts is not None and facts.surfaces == ("x = s",)
+
+
 def test_of_two_names_that_of_the_variable_comes_first() -> None:
     library = Library()
     file = library.put("<text>", "def f(set) integral [0, 1] [reading > set] d(reading)\n")

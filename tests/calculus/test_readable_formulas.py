@@ -268,9 +268,9 @@ def test_a_size_whose_sign_conditions_tell_is_written_without_bars(body: str, re
 
 
 SIZES = [
-    ("[x*y < t]*y", "abs(t)/x^2*[t*x > 0 and t/x < 1]", lambda t: 1 - abs(t)),
+    ("[x*y < t]*y", "abs(t)*dt*(integral [-1, 1] 1/x^2*[t*x > 0 and t/x < 1] d(x))", lambda t: 1 - abs(t)),
     ("[x*y < t]*y^2", "1/(x^2*abs(x))*[t*x > 0 and t/x < 1]", lambda t: (1 - t * t) / 2),
-    ("[x*y > -t]*y", "abs(t)/x^2*[t*x < 0 and t/x > -1]", lambda t: 1 - abs(t)),
+    ("[x*y > -t]*y", "abs(t)*dt*(integral [-1, 1] 1/x^2*[t*x < 0 and t/x > -1] d(x))", lambda t: 1 - abs(t)),
 ]
 
 
@@ -309,3 +309,23 @@ def test_opposite_sides_tenths_and_exponents_are_told_once(function: str, read: 
     library = Library()
     file = library.put("<text>", f"def {function}\n")
     assert explain_derivative(library.db, file, "f").integrals[0].interior == read
+
+
+@pytest.mark.parametrize(
+    ("function", "read"),
+    [
+        ("f(x, t, s) s*(1 - [x < t])", "ds*[t <= x]"),
+        ("f(x, t, s) s*exp(s)*([t <= x] + [x < t])*[x > 2]", "(s + 1)*exp(s)*ds*[x > 2]"),
+        ("f(t, s) integral [0, 1] exp(s*x) - exp(s*x)*[x < t] d(x)", "x*exp(s*x)*[t <= x]"),
+    ],
+)
+def test_a_condition_and_its_opposite_are_one(function: str, read: str) -> None:
+    library = Library()
+    file = library.put("<text>", f"def {function}\n")
+    assert read in explain_derivative(library.db, file, "f").tangent
+
+
+def test_a_formula_has_the_decimals_of_what_it_calls() -> None:
+    library = Library()
+    file = library.put("<text>", "def s(t) 4.905*t^2\ndef f(h) integral [0, 1] [s(t) < h] d(t)\n")
+    assert explain_derivative(library.db, file, "f").tangent == "if [0 < h < 4.905] then dh/(2*sqrt(4.905*h)) else 0"

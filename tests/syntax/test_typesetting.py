@@ -74,6 +74,11 @@ def test_meanings_break_between_them() -> None:
     ]
 
 
+def test_a_range_stays_whole() -> None:
+    lines = broken("", "sum i in 0..n - 1 (sum j in 0..len(w) - 1 (" + "a" * 30 + "*w[i] + " + "b" * 30 + "*w[j]))", 80)
+    assert [line.strip()[0] for line in lines] == ["s", "+"]
+
+
 def test_conditions_break_where_they_are_joined() -> None:
     """And not within one of them, although it is a sum."""
     formula = "(r*dr + (x - t)*dt)/sqrt(r^2 - t^2)*[t^2 + x^2 <= r^2 + 2*t*x and r^2 + 2*t*x < t^2 + x^2 + 4]"

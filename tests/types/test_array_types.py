@@ -216,9 +216,9 @@ def test_nothing_has_no_least() -> None:
 def test_places_of_a_look_up_rise() -> None:
     check("""
         def f(x) interp([0, 2, 1], [0, 1, 2], x)
-        #                      ^ error[P0335]: `interp` needs places that rise, but 1 follows 2
+        #                      ^ error[P0335]: `interp` needs increasing places, but 1 follows 2
         def g(x) interp([-1, (-1)], [0, 1], x)
-        #                    ^^^^ error[P0335]: `interp` needs places that rise, but -1 follows -1
+        #                    ^^^^ error[P0335]: `interp` needs increasing places, but -1 follows -1
         def h(a, x) interp([0, a, -1], [0, 1, 2], x)
         def k(x) interp([-2, -1, 0.5], [0, 1, 2], x)
     """)

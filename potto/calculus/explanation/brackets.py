@@ -1,8 +1,8 @@
 """Iverson brackets as conditions, in as few and as plain comparisons as they can be told.
 
-Owns `Inequality`, `conditions`, `turned_round`, `fewer`, `plainer`, `sign_where`, `two_sides`, `constant` and
-`implies`; how they are written is in `bounds`. A root is compared by squares or by what it is the root of, factors that
-do not change a sign are left out, and so is what another condition implies.
+Owns `Inequality`, `conditions`, `turned_round`, `fewer`, `plainer`, `sign_where`, `opposite`, `complementary`,
+`two_sides`, `constant` and `implies`; how they are written is in `bounds`. A root is compared by squares or by what it
+is the root of, factors that do not change a sign are left out, and so is what another condition implies.
 """
 
 from __future__ import annotations
@@ -172,6 +172,11 @@ def constant(term: Term) -> Fraction | None:
 def opposite(first: Inequality, second: Inequality) -> bool:
     """Whether one surface is above 0 where the other is below it."""
     return first.strict and second.strict and equal(first.surface, neg(second.surface))
+
+
+def complementary(first: Inequality, second: Inequality) -> bool:
+    """Whether one holds where the other does not."""
+    return first.strict != second.strict and equal(first.surface, neg(second.surface))
 
 
 def two_sides(term: Term) -> Term | None:

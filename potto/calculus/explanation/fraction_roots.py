@@ -1,6 +1,7 @@
 """Roots of fractions in a product, as fractions of roots where what they are divided by has a known sign.
 
-Owns `without_fractions`: abs(l)*sqrt(1 - d^2/l^2) is sqrt(l^2 - d^2), and sqrt(0.64/a) is 0.8/sqrt(a) where a > 0.
+Owns `without_fractions`: abs(l)*sqrt(1 - d^2/l^2) is sqrt(l^2 - d^2), sqrt(0.64/a) is 0.8/sqrt(a) where a > 0, and
+1/sqrt(h/3) is 3/sqrt(3*h).
 """
 
 from __future__ import annotations
@@ -15,6 +16,8 @@ from potto.calculus.explanation.factors import Factors, shortest
 from potto.core.polynomials import Exact
 from potto.core.terms import Prim, Term, const, prim
 
+_LARGEST = 1000  # of what a plain number is divided by
+
 
 def without_fractions(found: Factors) -> None:
     """Change a product so."""
@@ -24,16 +27,35 @@ def without_fractions(found: Factors) -> None:
         form = normal(base)
         if form is None or form.whole or len(form.below) != 1:
             continue
+        if set(form.below) == {()}:
+            _over_number(form, base, exponent, found)
+            continue
         apart = _of_quotient(form, found) if set(form.top) == {()} else _by_sizes(form, exponent, found)
         if apart is not None:
             found.times(base, -exponent)
             _times_root(found, apart, exponent)
 
 
+def _over_number(form: Rational, base: Term, exponent: Exact, found: Factors) -> None:
+    """What is divided by the root of u/n, by that of n*u; a root of u/n that is no divisor is read as it is."""
+    (divisor,) = form.below.values()
+    inside = as_term({m: c * divisor for m, c in form.top.items()})
+    if exponent < 0 and divisor > 0 and inside is not None:
+        found.times(base, -exponent)
+        found.times(inside, exponent)
+        found.coefficient = _plain(found.coefficient * _as_written(divisor) ** int(-2 * exponent))
+
+
+def _plain(value: Fraction) -> Fraction:
+    """The 1/2 that 4.905/9.81 is but for rounding."""
+    near = value.limit_denominator(_LARGEST)
+    return near if abs(near - value) <= abs(value) / 2**50 else value
+
+
 def _of_quotient(form: Rational, found: Factors) -> Factors | None:
     """A number over a product, by its factors, all of which are above 0 where the conditions hold."""
     (number,), ((below, divisor),) = form.top.values(), form.below.items()
-    value = _as_written(Fraction(number) / Fraction(divisor))
+    value = _as_written(number) / _as_written(divisor)
     powers: dict[Term, Exact] = {atom: -n for atom, n in below}
     told = value > 0 and all(n % 2 == 0 or _is_above(atom, found) for atom, n in powers.items())
     return Factors(value, powers, [], []) if told else None
@@ -58,10 +80,10 @@ def _by_sizes(form: Rational, exponent: Exact, found: Factors) -> Factors | None
         return None
     for size, n in sizes.items():
         found.times(size, -n * side)
-    return Factors(_as_written(1 / Fraction(divisor)), {whole: 1}, [], [])
+    return Factors(1 / _as_written(divisor), {whole: 1}, [], [])
 
 
-def _as_written(value: Fraction) -> Fraction:
+def _as_written(value: Exact) -> Fraction:
     """0.64 as 16/25, and not as the binary fraction that it is in a program."""
     return Fraction(repr(shortest(float(value))))
 

@@ -11,9 +11,22 @@ from potto.calculus.algebra.ranges import range_of
 from potto.calculus.explanation.factors import Factors
 from potto.calculus.explanation.products import is_tangent, written
 from potto.core.polynomials import Exact
-from potto.core.terms import Branch, Const, If, Integral, Prim, Sum, Term, Var, postorder, with_integrand, with_summand
+from potto.core.terms import (
+    Branch,
+    Const,
+    If,
+    Integral,
+    Prim,
+    Proj,
+    Sum,
+    Term,
+    Var,
+    postorder,
+    with_integrand,
+    with_summand,
+)
 
-_EVERYWHERE = ("add", "mul", "neg", "sin", "cos", "atan", "tanh")  # no exp, which can be inf
+_EVERYWHERE = ("add", "mul", "neg", "abs", "sin", "cos", "atan", "tanh")  # no exp, which can be inf
 
 
 def in_front(node: Integral | Sum, factors: Factors, tangents: frozenset[str]) -> Term:
@@ -60,7 +73,7 @@ def hides_index(node: Sum) -> bool:
 
 def _has_values(term: Term) -> bool:
     """Whether a term has a value wherever its variables have."""
-    return all(isinstance(part, Var | Const) or _is_everywhere(part) for part in postorder(term))
+    return all(isinstance(part, Var | Const | Proj) or _is_everywhere(part) for part in postorder(term))
 
 
 def _is_everywhere(part: Term) -> bool:

@@ -6,16 +6,17 @@ Owns `Notation`, `notation_of`, `written_notation`, `numbers_in` and `numbers_of
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from math import isfinite
 
 from msgspec import Struct
 
 from potto.calculus.explanation.decimals import in_decimals, over_whole_numbers
 from potto.calculus.explanation.fields import fields_of
 from potto.calculus.explanation.products import in_order
-from potto.core.numerals import Numbers
+from potto.core.numerals import Numbers, simple_fraction
 from potto.core.printer import format_equation, format_term
 from potto.core.simplify import simplify
-from potto.core.terms import Deriv, Global, Term, global_, transform
+from potto.core.terms import Const, Deriv, Global, Term, global_, postorder, transform
 from potto.elaborate import core_term
 from potto.modules import definition
 from potto.query import Database
@@ -34,8 +35,9 @@ class Notation(Struct, frozen=True):
 
     def text(self, term: Term) -> str:
         """A term whose fields have their names."""
-        whole = over_whole_numbers(term) if self.numbers is Numbers.FRACTIONS else term
-        return format_term(whole, numbers=self.numbers)
+        if self.numbers is not Numbers.FRACTIONS or any(map(_is_only_decimal, postorder(term))):
+            return format_term(term, numbers=Numbers.DECIMALS)
+        return format_term(over_whole_numbers(term), numbers=self.numbers)
 
     def equation(self, surface: Term, variables: Iterable[str] = ()) -> str:
         """Where a surface is, as people write it: `x = t` for t - x, where x is one of the variables."""
@@ -68,6 +70,13 @@ def numbers_of(db: Database, term: Term, *programs: nodes.Node) -> Numbers:
             written.append(definition(db, term.module, term.name))
         term = term.function if isinstance(term, Deriv) else core_term(db, term.module, term.name)
     return numbers_in(*written)
+
+
+def _is_only_decimal(term: Term) -> bool:
+    """Whether it is a number that is no plain fraction: 4.905, from a function that is called."""
+    if not isinstance(term, Const) or term.name is not None or not isfinite(term.value) or term.value.is_integer():
+        return False
+    return simple_fraction(term.value) is None
 
 
 def _is_decimal(node: nodes.Node) -> bool:

@@ -29,7 +29,7 @@ from potto.calculus.explanation.named_sums import put_back, with_sums_named
 from potto.calculus.explanation.oriented import either_way
 from potto.calculus.explanation.products import added, in_order, is_negative, led_by, with_one_root, written
 from potto.calculus.explanation.readable_parts import Part, ReadableParts
-from potto.calculus.explanation.signs import of_two, sign_of_product, size_of_product, sums_of_signs
+from potto.calculus.explanation.signs import of_two, sign_of_product, size_of_product, sums_of_sides, sums_of_signs
 from potto.calculus.explanation.squares import root_of_square, squares_in
 from potto.core.numerals import Numbers
 from potto.core.polynomials import Monomial, Polynomial, shared_by, without
@@ -217,7 +217,8 @@ class _Work:
         """The shortest of: the product of its factors, and the node expanded, with the sums in it or around them."""
         match node.op:
             case "add":
-                forms = [node, *sums_of_signs(node, self.tangents, self.inside, self.node), *self._choices(node)]
+                forms = [node, *sums_of_sides(node, self.tangents), *self._choices(node)]
+                forms += sums_of_signs(node, self.tangents, self.inside, self.node)
                 forms += collected(node, self._factored, self.node, self.tangents)
             case "sqrt":
                 forms = [written(factored(node), self.tangents), *self._of_squares(node)]

@@ -1,6 +1,6 @@
 """Signs in a formula: of products, and those that a sum of two brackets is; sizes, and which of two is the larger.
 
-Owns `sign_of_product`, `sums_of_signs`, `size_of_product` and `of_two`.
+Owns `sign_of_product`, `sums_of_signs`, `sums_of_sides`, `size_of_product` and `of_two`.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from fractions import Fraction
 
 from potto.calculus.algebra.ranges import range_of
-from potto.calculus.explanation.brackets import constant, opposite
+from potto.calculus.explanation.brackets import Inequality, complementary, constant, opposite, turned_round
 from potto.calculus.explanation.factors import Factors, factored, is_parity
 from potto.calculus.explanation.products import added, is_negative, written
 from potto.core.terms import Prim, Term, add, mul, neg, prim, sub
@@ -76,6 +76,40 @@ def sums_of_signs(
             if found is not None:
                 yield added([found, *(a for k, a in enumerate(node.args) if k not in (i, j))])
                 return
+
+
+def sums_of_sides(node: Prim, tangents: frozenset[str]) -> Iterator[Term]:
+    """[u > 0] + [u <= 0] as 1, and 1 - [u > 0] as [u <= 0]."""
+    parts, joined = [factored(arg) for arg in node.args], False
+    left: list[Factors] = []
+    while parts:
+        first = parts.pop()
+        for i, second in enumerate(parts):
+            both = _one_side(first, second) or _one_side(second, first)
+            if both is not None:
+                parts[i], joined = both, True
+                break
+        else:
+            left.append(first)
+    if joined:
+        yield added([written(part, tangents) for part in reversed(left)])
+
+
+def _one_side(whole: Factors, part: Factors) -> Factors | None:
+    """What remains of a product where the same with a further condition is taken off it, or added with the opposite."""
+    if whole.powers != part.powers or whole.exponents != part.exponents:
+        return None
+    more = [c for c in part.conditions if c not in whole.conditions]
+    lacks = [c for c in whole.conditions if c not in part.conditions]
+    kept = [c for c in whole.conditions if c not in lacks]
+    if len(more) != 1 or len(lacks) > 1:
+        return None
+    if lacks and (whole.coefficient != part.coefficient or not complementary(lacks[0], more[0])):
+        return None
+    if not lacks and whole.coefficient != -part.coefficient:
+        return None
+    side = [] if lacks else [Inequality(turned_round(more[0].surface), not more[0].strict)]
+    return Factors(whole.coefficient, dict(whole.powers), list(whole.exponents), [*kept, *side])
 
 
 def _sign(

@@ -22,7 +22,7 @@ from potto.runtime.evaluation.machine import Machine
 OUT_OF_RANGE = declare("P0511", "an index that is out of range")
 NO_PLACE = declare("P0512", "an index or a size that is not a whole number")
 RAGGED = declare("P0513", "sizes that do not agree")
-NO_RISE = declare("P0514", "places of a look-up that do not rise")
+NO_RISE = declare("P0514", "places of a look-up that do not increase")
 
 MOST_ELEMENTS = 100_000_000
 
@@ -175,7 +175,7 @@ def _count(whole: Value) -> int:
 
 def _see_that_it_rises(whole: Value) -> None:
     if not isinstance(whole, Rows) or not isinstance(whole.item, Cell):
-        raise errors.wrong_call("`interp` looks between places that are numbers")
+        raise errors.wrong_call("the places of `interp` must be numbers")
     numbers = np.asarray(whole.item.v)
     if not numbers.ndim:
         numbers = np.full(whole.size, numbers)
@@ -184,7 +184,7 @@ def _see_that_it_rises(whole: Value) -> None:
     if bad.size:
         place, *member = map(int, bad[0])
         first, second = (float(numbers[at, *member]) for at in (place, place + 1))
-        message = f"`interp` needs places that rise, but {second!r} follows {first!r}"
+        message = f"`interp` needs increasing places, but {second!r} follows {first!r}"
         note = f"they are the elements {place} and {place + 1} of its first argument"
         help = "sort them, with the values beside them"
         raise PottoError([NO_RISE(errors.NOWHERE, message, notes=(note,), help=help)])

@@ -63,7 +63,12 @@ def _places(text: str) -> list[int]:
     factors: dict[int, list[int]] = {}
     ends: dict[int, int] = {}
     around = [_OUTSIDE]
+    ranges = set[int]()  # in what there is a range, up to the body of its sum: `0..n - 1 (`
     for i, char in enumerate(text):
+        if text.startswith("..", i):
+            ranges.add(around[-1])
+        elif char == "," or text.startswith(" (", i):
+            ranges.discard(around[-1])
         if char == "|" and around[-1] != _OUTSIDE and text[around[-1]] == "|":
             ends[around.pop()] = i
         elif char in "([{|":
@@ -76,7 +81,7 @@ def _places(text: str) -> list[int]:
             orders.setdefault(around[-1], []).append(i)
         elif i and text.startswith(_SIDES, i):
             choices.setdefault(around[-1], []).append(i)
-        elif i and text.startswith(_SIGNS, i):
+        elif i and text.startswith(_SIGNS, i) and around[-1] not in ranges:
             sums.setdefault(around[-1], []).append(i)
         elif i and char in _FACTORS:
             factors.setdefault(len(around), []).append(i)
