@@ -138,9 +138,9 @@ The server asks, and shows what comes of it."
   (potto--command "potto.more" name))
 
 (defun potto-view ()
-  "Show the integrals of this file as a page in the browser."
+  "Show the integrals of this file as a page in the browser, until Emacs ends."
   (interactive)
-  (start-process "potto-view" nil potto-program "view" buffer-file-name))
+  (set-process-query-on-exit-flag (start-process "potto-view" nil potto-program "view" buffer-file-name) nil))
 
 (defun potto-run ()
   "Run this file."

@@ -20,7 +20,8 @@ local function root_of(path)
   return start
 end
 
---- Values of live expressions as inlay hints (0.10 or newer), values of definitions as code lenses.
+--- Values of live expressions as inlay hints (0.10 or newer), values of definitions as code lenses. Only once the server
+--- has started: 0.7 asks for no lenses any more where it was asked to before.
 local function show_values(buffer)
   if vim.lsp.inlay_hint and vim.lsp.inlay_hint.enable then
     vim.lsp.inlay_hint.enable(true, { bufnr = buffer })
@@ -28,28 +29,36 @@ local function show_values(buffer)
   if vim.lsp.codelens and vim.lsp.codelens.enable then -- 0.12, which keeps them itself
     vim.lsp.codelens.enable(true, { bufnr = buffer })
   elseif vim.lsp.codelens then
+    local function refresh()
+      vim.lsp.codelens.refresh({ bufnr = buffer })
+    end
     vim.api.nvim_create_autocmd({ "BufEnter", "InsertLeave", "BufWritePost" }, {
+      group = vim.api.nvim_create_augroup("potto_values_" .. buffer, { clear = true }),
       buffer = buffer,
-      callback = function()
-        vim.lsp.codelens.refresh({ bufnr = buffer })
-      end,
+      callback = refresh,
     })
+    if buffer == vim.api.nvim_get_current_buf() then -- which 0.7 asks about whatever it is given
+      refresh()
+    end
   end
 end
 
 local clients = {} -- by root, in 0.7
 
---- Attach a buffer to the client of its root, which is started if there is none. The client, if it could be.
+--- Attach a buffer to the client of its root, which is started if there is none.
 local function start(config, buffer)
   if vim.lsp.start then -- 0.8
-    return vim.lsp.start(config, { bufnr = buffer })
+    vim.lsp.start(config, { bufnr = buffer })
+    return
   end
   local id = clients[config.root_dir]
   if not id or not vim.lsp.get_client_by_id(id) then
     id = vim.lsp.start_client(config)
     clients[config.root_dir] = id
   end
-  return id and vim.lsp.buf_attach_client(buffer, id) and id
+  if id then
+    vim.lsp.buf_attach_client(buffer, id)
+  end
 end
 
 local function attach(buffer, options)
@@ -58,7 +67,7 @@ local function attach(buffer, options)
     return
   end
   local root = root_of(name)
-  local id = start({
+  start({
     name = "potto",
     cmd = options.cmd,
     root_dir = root,
@@ -66,11 +75,13 @@ local function attach(buffer, options)
     settings = options.settings,
     init_options = options.settings,
     capabilities = vim.lsp.protocol.make_client_capabilities(),
-    on_attach = options.on_attach,
+    on_attach = function(client, attached)
+      show_values(attached)
+      if options.on_attach then
+        options.on_attach(client, attached)
+      end
+    end,
   }, buffer)
-  if id then
-    show_values(buffer)
-  end
 end
 
 --- Ask the server of a buffer to run one of its commands, and show the text that it answers.
@@ -103,8 +114,8 @@ function M.setup(options)
     command("potto.differentiate", given.args ~= "" and given.args or vim.fn.expand("<cword>"))
   end, { nargs = "?", desc = "The derivative of a definition, in symbols" })
   vim.api.nvim_create_user_command("PottoView", function()
-    vim.fn.jobstart({ options.cmd[1], "view", vim.api.nvim_buf_get_name(0) }, { detach = true })
-  end, { desc = "The integrals of this file, as a page in the browser" })
+    vim.fn.jobstart({ options.cmd[1], "view", vim.api.nvim_buf_get_name(0) })
+  end, { desc = "The integrals of this file, as a page in the browser, until Neovim ends" })
   vim.api.nvim_create_user_command("PottoMore", function(given)
     command("potto.more", given.args ~= "" and given.args or vim.fn.expand("<cword>"))
   end, { nargs = "?", desc = "What can be done with a definition, to choose from" })

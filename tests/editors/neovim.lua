@@ -18,6 +18,11 @@ for _, diagnostic in ipairs(vim.diagnostic.get(0)) do
     found.diagnostic = { code = diagnostic.code, line = diagnostic.lnum, from = diagnostic.col, to = diagnostic.end_col, message = diagnostic.message }
   end
 end
+local function lenses()
+  return vim.lsp.codelens.get(vim.api.nvim_get_current_buf()) or {}
+end
+wait("no lenses", function() return #lenses() > 0 end)
+found.lenses = vim.tbl_map(function(lens) return lens.command and lens.command.title or "" end, lenses())
 local function ask(method, params)
   local answers = assert(vim.lsp.buf_request_sync(0, method, params, 30000))
   for _, answer in pairs(answers) do

@@ -24,15 +24,17 @@ def test_a_session(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     assert found["renamed"][2] == "def ball(x, y, r) [x^2 + y^2 < r^2]"
     assert "if [x + c > 0.5] then 1 else 0" in found["fixed"]
     assert float(found["value"].split()[0]) == pytest.approx(math.pi / 16, rel=1e-8)  # a quarter of a disc
+    assert "more" in found["lenses"]  # without being asked for
     assert found["groups"][:4] == ["pottoDefine", "pottoFunction", "pottoIntegral", "pottoConditional"]
 
 
+OLDER = ["buf_attach_client", "codelens.refresh"]
 TODAY = ["start", "inlay_hint.enable", "codelens.enable"]
 
 
 @pytest.mark.parametrize(
     ("today", "called"),
-    [("1", [*TODAY, *TODAY]), ("0", ["start_client", "buf_attach_client", "buf_attach_client", "codelens.refresh"])],
+    [("1", [*TODAY, *TODAY]), ("0", ["start_client", *OLDER, *OLDER, "codelens.refresh"])],
 )
 def test_functions_that_newer_versions_give_up_are_called_in_older_ones_alone(
     run: Run, monkeypatch: pytest.MonkeyPatch, today: str, called: list[str]
