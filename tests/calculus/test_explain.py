@@ -232,3 +232,7 @@ def test_roots_are_named_where_they_exist() -> None:
 def test_the_tangent_of_a_field_is_typeset_as_one() -> None:
     found = explain("record S(at: Real)\ndef f(s: S) integral [0, 1] [x < s.at] d(x)", "f")
     assert "∂s.at" in found.unicode(found.integrals[0].deltas[0])
+
+
+def test_conditions_that_always_hold_are_not_told() -> None:
+    assert explain("def f(p) integral (k ~ binomial(10, p)) k d(k)", "f").conditions == ("0 < p and p < 1",)

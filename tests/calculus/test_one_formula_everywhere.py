@@ -113,11 +113,13 @@ def test_surfaces_are_written_alike(integrand: str, equation: str) -> None:
     assert [surface["surface"] for surface in stats["surfaces"]] == [equation]
 
 
-def test_the_surfaces_of_functions_that_are_called_are_told() -> None:
+def test_what_a_call_brings_in_is_told_as_its_own() -> None:
+    """The surfaces of the function that is called, and bounds without what its arguments make twice."""
     library = Library()
-    file = library.put("<text>", "def f(t) integral [0, 1] [x < t] d(x)\ndef g(s) f(s)^2\n")
-    facts = derivative_facts(library.db, file, "g")
-    assert facts is not None and facts.surfaces == ("x = s",)
+    text = "def g(x, h, t) integral [x - h/2, x + h/2] [u < t] d(u)\ndef f(i, t) g((i + 1/2)/t, 1/t, t)\n"
+    facts = derivative_facts(library.db, library.put("<text>", text), "f")
+    assert facts is not None and facts.surfaces == ("u = t",)
+    assert facts.integrals[0].value == "integral [i/t, (i + 1)/t] [u < t] d(u)"
 
 
 def test_of_two_names_that_of_the_variable_comes_first() -> None:

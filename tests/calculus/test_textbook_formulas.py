@@ -40,6 +40,11 @@ TEXTBOOK = {
     "a bound on either side": ("integral [0, b] [x < a]*x d(x)", "b*db*[b < a] + a*da*([0 < a < b] - [b < a < 0])"),
     "a threshold": ("integral [0, 1] [1/4 <= a*x^2] d(x)", "if [a > 1/4] then da/(4*a*sqrt(a)) else 0"),
     "a fall": ("integral [0, 1] [3*x^2 < a] d(x)", "if [0 < a < 3] then da/(2*sqrt(3*a)) else 0"),
+    "a cube root": ("integral [0, 1] [x^3 < a] d(x)", "if [0 < a < 1] then da/(3*a^(2/3)) else 0"),
+    "a product of sums": (
+        "(a + b)*(1 - a)*(b + 1)",
+        "(b + 1)*(1 - 2*a - b)*da + (1 - a)*(2*b + a + 1)*db",
+    ),
     "reach of an arm": (
         "integral [0, pi] [b*cos(x/2) < a] d(x)",
         "if [-1 <= a/b < 1 and 2*acos(a/b) < pi] then 2*(b*da - a*db)/(b*sqrt(b^2 - a^2)) else 0",

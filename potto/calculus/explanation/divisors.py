@@ -52,8 +52,10 @@ def _divisors(formula: Term, names: frozenset[str], original: Iterable[Term], kn
 def _zero_of(base: Term) -> Term:
     """What is 0 where a size, or a power with a fraction for its exponent, is."""
     match base:
-        case Prim(op="abs", args=(inner,)) | Prim(op="pow", args=(inner, Const())):
+        case Prim(op="abs", args=(inner,)):
             return inner
+        case Prim(op="pow", args=(inner, power)) if not power.free:
+            return _zero_of(inner)
         case _:
             return base
 

@@ -22,12 +22,14 @@ from potto.calculus.differentiation.dual import Differentiator
 from potto.calculus.differentiation.higher_order import moving_deltas
 from potto.calculus.differentiation.level_sets import level_set
 from potto.calculus.differentiation.root_names import RootNames, names_in
+from potto.calculus.explanation.alternatives import holds
 from potto.calculus.explanation.continuity import continuous
 from potto.calculus.explanation.divisors import divided_by
 from potto.calculus.explanation.fields import fields_of
 from potto.calculus.explanation.layout import DerivativeText, IntegralText, SurfaceText
 from potto.calculus.explanation.notation import Notation, Rewrite, notation_of, written_notation
 from potto.calculus.explanation.plain_names import Each, apart, plainly_indexed, plainly_named
+from potto.calculus.explanation.readable import readable
 from potto.calculus.explanation.readable_parts import ReadableParts
 from potto.calculus.explanation.symbols import Formula, NoFormula, Words, over_functions, shorter
 from potto.calculus.inlining.expand import Resolve, heads_of
@@ -37,7 +39,7 @@ from potto.calculus.surfaces.branch_assignment import box_of, branches_of, with_
 from potto.calculus.surfaces.branch_assignment import unguarded as where_it_exists
 from potto.calculus.surfaces.branch_cuts import opened
 from potto.calculus.surfaces.case_split import unnested
-from potto.core.simplify import normalized_surface
+from potto.core.simplify import normalized_surface, simplify
 from potto.core.terms import (
     ONE,
     ZERO,
@@ -157,7 +159,7 @@ def describe(
     integrals = tuple(
         _integral(unnested(i), each, work, tangents, words) for i, each in known if isinstance(i, Integral)
     )
-    where = tuple(dict.fromkeys(map(words.condition, conditions)))
+    where = tuple(dict.fromkeys(map(words.condition, (each for each in conditions if not holds(simplify(each))))))
     found = DerivativeText(name, type_text, tangent.text, isinstance(body, Integral), integrals, where)
     found = replace(found, problems=tuple(problems), smooth=tangent.text, parameters=tuple(params))
     found = replace(found, divisors=divided_by(tangent, (body, work.carried_out(body)), conditions, words))
@@ -270,7 +272,7 @@ def _integral(
     except PottoError as problem:
         reason = problem.diagnostics[0].message
     return IntegralText(
-        _head(node, words.notation),
+        _head(node, words),
         ", ".join(node.variables),
         words.plain(node.body),
         interior,
@@ -284,9 +286,16 @@ def _integral(
     )
 
 
-def _head(node: Integral, notation: Notation) -> str:
-    """`integral` and the bounds, without what stands under it."""
-    return notation.text(notation.fields(integral(node.variables, node.bounds, ONE))).rpartition(" 1 ")[0]
+def _head(node: Integral, words: Words) -> str:
+    """`integral` and the bounds, these as short as can be, without what stands under it."""
+    text = words.notation.text
+
+    def shortest(bound: Term) -> Term:
+        written = words.notation.fields(bound)
+        return min(written, readable(simplify(written), frozenset()), key=lambda each: len(text(each)))
+
+    bounds = tuple([(shortest(lo), shortest(hi)) for lo, hi in node.bounds])
+    return text(integral(node.variables, bounds, ONE)).rpartition(" 1 ")[0]
 
 
 def _swept(

@@ -54,7 +54,7 @@ def put_back(term: Term, named: NamedSums, tangents: frozenset[str], summed: Cal
         if not _adds_one_of(old, meant):
             return new
         found = normal(new)
-        fewer = found is not None and found.whole and isinstance(new, Prim) and len(found.top) < len(new.args)
+        fewer = found is not None and found.whole and isinstance(new, Prim) and len(found.top) < _summands(new)
         if found is None or not fewer:
             return new
         collected.append(new)
@@ -63,6 +63,12 @@ def put_back(term: Term, named: NamedSums, tangents: frozenset[str], summed: Cal
     collected: list[Term] = []
     whole = transform(term, change) if named else term
     return written(factored(whole), tangents) if collected else whole
+
+
+def _summands(term: Prim) -> int:
+    """How many summands a sum is read as, those of a sum that is taken off among them."""
+    parts = (children(part)[0] if is_negative(part) else part for part in term.args)
+    return sum(len(children(part)) if isinstance(part, Prim) and part.op == "add" else 1 for part in parts)
 
 
 def _adds_one_of(term: Term, names: Container[str]) -> bool:

@@ -78,8 +78,8 @@ def _tidied(known: Factors) -> Factors:
             _rooted(found, base)
         if (inner := _signed_by(base)) is not None:
             _signed(found, base, inner)
-        if isinstance(base, Prim) and base.op == "abs" and exponent.denominator == 1:
-            _sized(found, base, int(exponent))
+        if isinstance(base, Prim) and base.op == "abs":
+            _sized(found, base, exponent)
     return found
 
 
@@ -113,14 +113,20 @@ def _where(known: Sequence[Inequality], base: Term) -> Term | None:
     return None if whole is ZERO or inner.exponents or inner.conditions else whole
 
 
-def _sized(found: Factors, size: Prim, exponent: int) -> None:
-    """abs(v) as v or -v where the conditions tell the sign of v, and t/(v*abs(v)) as abs(t)/v^2 where t*v > 0."""
+def _sized(found: Factors, size: Prim, exponent: Exact) -> None:
+    """abs(v) as v or -v where the conditions tell the sign of v, and t/(v*abs(v)) as abs(t)/v^2 where t*v > 0. Its cube
+    root is that of v where v is above 0."""
     inner = size.args[0]
     told = sign_where(found.conditions, inner)
+    if exponent.denominator != 1:
+        if told is not None and told[0] > 0:
+            found.times(size, -exponent)
+            found.times(inner, exponent)
+        return
     if told is not None:
         found.times(size, -exponent)
         found.times(inner, exponent)
-        found.coefficient *= told[0] ** abs(exponent)
+        found.coefficient *= told[0] ** abs(int(exponent))
         return
     if exponent % 2 == 0 or found.powers.get(inner, 0) % 2 != 1:
         return
