@@ -15,6 +15,7 @@ from potto.calculus.checking.conditions import conditions_of
 from potto.calculus.checking.diffeo import exported
 from potto.calculus.decomposition.guards import unguarded
 from potto.calculus.explanation.bound_names import as_written
+from potto.calculus.explanation.decimals import in_decimals
 from potto.calculus.explanation.explain import describe, explain_derivative
 from potto.calculus.explanation.fields import fields_of
 from potto.calculus.explanation.layout import WIDTH, DerivativeText, IntegralText, Show, meets
@@ -201,5 +202,5 @@ def _body_facts(term: Term, found: DerivativeText, notation: Notation) -> PartFa
     while isinstance(term, Lam):
         term = term.body
     interior = "" if found.integrals else found.smooth
-    value = notation.text(notation.fields(as_written(unguarded(term)[0])))
+    value = notation.text(simplify(in_decimals(notation.fields(as_written(unguarded(term)[0])))))
     return PartFacts(value, interior, found.deltas, (), "; ".join(found.problems), found.continuous)

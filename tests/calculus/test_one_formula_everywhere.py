@@ -122,6 +122,14 @@ def test_what_a_call_brings_in_is_told_as_its_own() -> None:
     assert facts.integrals[0].value == "integral [i/t, (i + 1)/t] [u < t] d(u)"
 
 
+def test_an_integral_reads_the_same_in_what_is_around_it() -> None:
+    library = Library()
+    file = library.put("<text>", "def f(t) 2*(integral (x ~ normal(0, 1)) [x < t] d(x))\n")
+    facts = derivative_facts(library.db, file, "f")
+    assert facts is not None and facts.body is not None
+    assert facts.body.value == f"2*({facts.integrals[0].value})"
+
+
 def test_of_two_names_that_of_the_variable_comes_first() -> None:
     library = Library()
     file = library.put("<text>", "def f(set) integral [0, 1] [reading > set] d(reading)\n")

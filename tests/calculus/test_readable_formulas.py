@@ -329,3 +329,10 @@ def test_a_formula_has_the_decimals_of_what_it_calls() -> None:
     library = Library()
     file = library.put("<text>", "def s(t) 4.905*t^2\ndef f(h) integral [0, 1] [s(t) < h] d(t)\n")
     assert explain_derivative(library.db, file, "f").tangent == "if [0 < h < 4.905] then dh/(2*sqrt(4.905*h)) else 0"
+
+
+def test_a_formula_has_the_decimals_of_what_it_names_and_numbers_added_up() -> None:
+    library = Library()
+    text = "a = 0.2\ndef f(r) integral [0, 1] [(a^2 + 1/100 - r^2 + 9)*x < a] d(x)\n"
+    facts = derivative_facts(library.db, library.put("<text>", text), "f")
+    assert facts is not None and facts.surfaces == ("a = (a^2 + 9.01 - r^2)*x",)

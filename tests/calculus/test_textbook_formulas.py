@@ -45,6 +45,7 @@ TEXTBOOK = {
         "(a + b)*(1 - a)*(b + 1)",
         "(b + 1)*(1 - 2*a - b)*da + (1 - a)*(2*b + a + 1)*db",
     ),
+    "a number's root leads": ("1/(sqrt(2)*(a + b) + 2)", "-sqrt(2)*(da + db)/(sqrt(2)*(a + b) + 2)^2"),
     "reach of an arm": (
         "integral [0, pi] [b*cos(x/2) < a] d(x)",
         "if [-1 <= a/b < 1 and 2*acos(a/b) < pi] then 2*(b*da - a*db)/(b*sqrt(b^2 - a^2)) else 0",

@@ -63,13 +63,15 @@ def numbers_in(*programs: nodes.Node | None) -> Numbers:
 
 
 def numbers_of(db: Database, term: Term, *programs: nodes.Node) -> Numbers:
-    """The same of programs and of the definitions that a term names, or of which it names the derivative."""
+    """The same of programs and of the definitions that a term names, or of which it names the derivative, and of those
+    that these name."""
     written: list[nodes.Node | None] = [*programs]
     while isinstance(term, Deriv | Global):
         if isinstance(term, Global):
             written.append(definition(db, term.module, term.name))
         term = term.function if isinstance(term, Deriv) else core_term(db, term.module, term.name)
-    return numbers_in(*written)
+    named = {node for node in postorder(term) if isinstance(node, Global)}
+    return numbers_in(*written, *(definition(db, node.module, node.name) for node in named))
 
 
 def _is_only_decimal(term: Term) -> bool:

@@ -205,7 +205,7 @@ def written(found: Factors, tangents: frozenset[str]) -> Term:
     scale, divisor = _scale(abs(found.coefficient), bool(below))
     exponent = [prim("exp", _exponent(found.exponents))] if found.exponents else []
     plain = [b for b in top if place[b][0] == _PLAIN]
-    led = [b for b in plain if place[b][1][0] <= 1 and found.powers[b].denominator == 1]
+    led = [b for b in plain if place[b][1][0] <= 1 and (found.powers[b].denominator == 1 or _is_number(b))]
     above = [*_powers(found, led, 1), *exponent, *_powers(found, [b for b in plain if b not in led], 1)]
     moving, integrals, either, deltas = (
         [_raised(b, found.powers[b]) for b in top if place[b][0] in places]
@@ -232,16 +232,22 @@ def _exponent(parts: Sequence[Term]) -> Term:
 
 
 def _powers(found: Factors, bases: Iterable[Term], sign: int) -> list[Term]:
-    """Bases with their exponents, square roots last."""
+    """Bases with their exponents, square roots last, but those of numbers first: sqrt(2)*x*sqrt(t)."""
+    numbers: list[Term] = []
     roots: list[Term] = []
     out: list[Term] = []
     for base in bases:
         exponent = sign * found.powers[base]
         if exponent == _HALF:
-            roots.append(base)
+            (numbers if _is_number(base) else roots).append(base)
         else:
             out.append(_raised(base, exponent))
-    return [*out, *(prim("sqrt", root) for root in roots)]
+    first, last = ([prim("sqrt", base) for base in bases] for bases in (numbers, roots))
+    return [*first, *out, *last]
+
+
+def _is_number(base: Term) -> bool:
+    return isinstance(base, Const) and base.name is None
 
 
 def with_one_root(node: Term) -> Term:
