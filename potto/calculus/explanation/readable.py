@@ -217,7 +217,7 @@ class _Work:
         """The shortest of: the product of its factors, and the node expanded, with the sums in it or around them."""
         match node.op:
             case "add":
-                forms = [node, *sums_of_sides(node, self.tangents), *self._choices(node)]
+                forms = [node, *sums_of_sides(node, self.tangents, self._factored), *self._choices(node)]
                 forms += sums_of_signs(node, self.tangents, self.inside, self.node)
                 forms += collected(node, self._factored, self.node, self.tangents)
             case "sqrt":

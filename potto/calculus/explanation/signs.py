@@ -78,11 +78,11 @@ def sums_of_signs(
                 return
 
 
-def sums_of_sides(node: Prim, tangents: frozenset[str]) -> Iterator[Term]:
+def sums_of_sides(node: Prim, tangents: frozenset[str], factors: Callable[[Term], Factors]) -> Iterator[Term]:
     """[u > 0] + [u <= 0] as 1, and 1 - [u > 0] as [u <= 0]."""
-    parts, joined = [factored(arg) for arg in node.args], False
+    parts, joined = list(map(factors, node.args)), False
     left: list[Factors] = []
-    while parts:
+    while parts and any(part.conditions for part in parts):
         first = parts.pop()
         for i, second in enumerate(parts):
             both = _one_side(first, second) or _one_side(second, first)
@@ -92,7 +92,7 @@ def sums_of_sides(node: Prim, tangents: frozenset[str]) -> Iterator[Term]:
         else:
             left.append(first)
     if joined:
-        yield added([written(part, tangents) for part in reversed(left)])
+        yield added([written(part, tangents) for part in (*parts, *reversed(left))])
 
 
 def _one_side(whole: Factors, part: Factors) -> Factors | None:
