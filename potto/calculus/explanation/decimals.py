@@ -26,9 +26,9 @@ def in_decimals(term: Term) -> Term:
             case Prim(op="add" | "mul" as op, args=args) if all(map(_is_number, args)):
                 numbers = [Fraction(repr(arg.value)) for arg in args if isinstance(arg, Const)]
                 return const(float(sum(numbers) if op == "add" else prod(numbers)))
-            case Prim(op="add", args=args) if len(numbers := [arg for arg in args if _is_number(arg)]) > 1:
-                whole = sum(Fraction(repr(arg.value)) for arg in numbers if isinstance(arg, Const))
-                return add(*(arg for arg in args if arg not in numbers), const(float(whole)))
+            case Prim(op="add", args=args) if len(several := [arg for arg in args if _is_number(arg)]) > 1:
+                whole = sum(Fraction(repr(arg.value)) for arg in several if isinstance(arg, Const))
+                return add(*(arg for arg in args if arg not in several), const(float(whole)))
             case Prim(op="neg", args=(Const(name=None, value=value),)):
                 return const(-value)
             case Prim(op="neg", args=(Prim(op="mul", args=(Const(name=None, value=value), *rest)),)) if value < 0:
