@@ -185,7 +185,7 @@ class Shaped(Struct, frozen=True):
 class Pieces(Columns):
     """Pieces of segments under refinement, and what is known of each: integrals and errors per channel (C, P).
 
-    led: (2 * C, P) what the nodes lead to at left, then at right ends, where jumps may lie that no cut tells of.
+    led: (2 * C, P) what the nodes lead to at left, then at right ends. rest: (C, P) how large its last terms are.
     lean: -p or p where a singularity sits at the left or right end, and powers of p would grade it.
     excess: (P,) the worst of a piece's errors, of the size of what it is a part of. stuck: how many times in a row
     that hardly fell when the piece was refined.
@@ -203,6 +203,7 @@ class Pieces(Columns):
     ends: Array = field(default_factory=lambda: np.zeros((0, 0)))
     tail: Array = field(default_factory=lambda: np.zeros((0, 0)))
     led: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    rest: Array = field(default_factory=lambda: np.zeros((0, 0)))
     lean: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     excess: Array = field(default_factory=lambda: np.zeros(0))
     stuck: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
@@ -232,7 +233,7 @@ class Pieces(Columns):
 
     def unmeasured(self, like: Pieces) -> Pieces:
         """The pieces as ones of which nothing is known, with as many channels as others have."""
-        for name in ("integral", "floor", "size", "most", "ends", "tail", "led"):
+        for name in ("integral", "floor", "size", "most", "ends", "tail", "led", "rest"):
             setattr(self, name, np.zeros((getattr(like, name).shape[0], self.u0.size)))
         self.error = np.full(self.integral.shape, np.inf)
         self.lean = np.zeros(self.u0.size, dtype=np.int64)
@@ -243,7 +244,7 @@ class Pieces(Columns):
         self.settled()
         change = np.abs(again.integral - self.integral[:, at])
         again.error = np.maximum(again.error, change)
-        for name in ("integral", "error", "floor", "size", "most", "ends", "tail", "led"):
+        for name in ("integral", "error", "floor", "size", "most", "ends", "tail", "led", "rest"):
             getattr(self, name)[:, at] = getattr(again, name)
 
     def pick(self, index: Any) -> Pieces:

@@ -27,7 +27,7 @@ from potto.integrate.adaptive.refinement import (
     too_coarse,
 )
 from potto.integrate.adaptive.reynolds import Totals, sums, totals
-from potto.integrate.adaptive.seams import at_seams
+from potto.integrate.adaptive.seams import at_seams, beyond_nodes
 from potto.integrate.adaptive.short_neighbours import unseen
 from potto.integrate.adaptive.tails import paced
 from potto.integrate.columns import distinct
@@ -75,7 +75,7 @@ def integrated(work: PanelBatch) -> Sums:
     if not work.last and (work.conflict or work.paired or seems_to_step(work, fresh)):
         work.steps = steps_at_cuts(work, fresh)
     if work.exact is None:
-        fresh = count_unreached(work, beside_short_ones(work, fresh), ends)
+        fresh = beyond_nodes(work, count_unreached(work, beside_short_ones(work, fresh), ends))
     found = totals(work, fresh, ends)
     if good_enough(work, fresh, found, ends):
         return sums(work, found, ends)
@@ -86,7 +86,7 @@ def integrated(work: PanelBatch) -> Sums:
     if tally.settle_forms(work, done):
         done.excess[:] = 0.0
         done = refine(work, done, ends, tally)
-    done = count_unreached(work, at_seams(work, done), ends)
+    done = beyond_nodes(work, count_unreached(work, at_seams(work, done), ends))
     for _ in range(DOUBTFUL_ROUNDS):
         found = totals(work, done, ends)
         bad = doubtful(work, done, found)
@@ -94,7 +94,7 @@ def integrated(work: PanelBatch) -> Sums:
             break
         halves = halved(done.pick(bad))
         halves = replaced(work, done.pick(bad), halves, HALF_ORDER, tally)
-        done = at_seams(work, done.pick(~bad).join(refine(work, halves, ends, tally)))
+        done = beyond_nodes(work, at_seams(work, done.pick(~bad).join(refine(work, halves, ends, tally))))
     else:
         found = totals(work, done, ends)
     return given_up(work, done, found, sums(work, found, ends))

@@ -172,15 +172,14 @@ class PanelBatch(Struct, dict=True):
             p.error = np.zeros(size.shape[:-1])
         p.coefficients, p.heights = coefficients, height
         p.size = height @ rule.weights
+        p.rest, led = size[..., -2:].sum(axis=-1), np.moveaxis(coefficients @ rule.ends, -1, 0)
+        p.led = led.reshape(-1, p.u0.size)
         if self.ends is not None:
             stride = height.shape[0] // self.width
             p.most = height[::stride].max(axis=-1)
-            p.ends = np.concatenate(np.moveaxis(coefficients[::stride] @ rule.ends, -1, 0))
-            p.tail = size[::stride, :, -2:].sum(axis=-1)
+            p.ends, p.tail = np.concatenate(led[:, ::stride]), p.rest[::stride]
         else:
             p.most = p.ends = p.tail = np.empty((0, p.u0.size))
-        ends = np.moveaxis(coefficients @ rule.ends, -1, 0) if self.blind else np.empty((0, p.u0.size))
-        p.led = ends.reshape(-1, p.u0.size)
         p.floor = 4 * EPS * p.size + (size @ rule.slopes) * shake
         if self.ends is not None and self.last and not self.tracked:
             p.floor += noise(self.ends, self.width, p, seg)
