@@ -76,3 +76,13 @@ def test_moving_a_definition_asks_nothing_again() -> None:
         everything(f.library, f.file, "\n\n" + f.text())
     names = ("definition_words", "definition_symbol", "definition_hints", "definition_markdown", "condition_infos")
     assert [e for e in events if e.kind == "executed" and e.query in names] == []
+
+
+def test_the_view_asks_for_no_formulas():
+    """Equations and places are enough for it: where surfaces are, and inverses, take longer to write."""
+    f = fixture(PROGRAM)
+    with f.db.recording() as events:
+        found = ide.viewed(f.db, f.file, f.find("integral"))
+    assert found is not None and [c.equation for c in found.conditions] == ["x^2 + y^2 = r^2"]
+    ran = {e.query for e in events if e.kind == "executed"}
+    assert "condition_places" in ran and not ran & {"condition_infos", "derivative_text"}

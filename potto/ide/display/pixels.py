@@ -19,7 +19,7 @@ from potto.core.terms import App, Branch, Delta, Integral, Term, add, const, mul
 from potto.elaborate import core
 from potto.ide.hover.derivatives import (
     Functions,
-    condition_infos,
+    condition_places,
     conditions,
     is_sound,
     shown_equation,
@@ -52,7 +52,7 @@ def pixel_conditions(db: Database, file: str, name: str, given: Functions = ()) 
     elaborated = core(db, file, name)
     notation = written_notation(db, file, name)
     spans, params, middles = dict(elaborated.origins), parameters_of(elaborated.term), _middles(elaborated.term)
-    shown = {(info.span, info.equation) for info in condition_infos(db, file, name, given) if not info.problem}
+    shown = frozenset(condition_places(db, file, name, given))
     under = conditions(db, file, name, given)
     known = {condition.written for condition in under}
     beside = [c for c in conditions(db, file, name, given, params) if c.written not in known]

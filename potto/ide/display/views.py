@@ -8,7 +8,7 @@ from __future__ import annotations
 from msgspec import Struct
 
 from potto.ide.display.scenes import scene
-from potto.ide.hover.derivatives import condition_infos
+from potto.ide.hover.derivatives import condition_places
 from potto.ide.names.live_expressions import wrong_with
 from potto.ide.names.places import chunk_at, owner
 from potto.query import Database
@@ -44,8 +44,8 @@ def viewed(db: Database, file: str, offset: int) -> Viewed | None:
         return None
     fitting = [(p.name, [text for text in p.fits if not wrong_with(db, file, text)]) for p in seen.parameters]
     given = tuple((parameter, texts[0]) for parameter, texts in fitting if texts)  # as the picture begins with
-    infos = [info for info in condition_infos(db, file, name, given) if not info.problem]
-    conditions = tuple(ViewedCondition(info.equation, chunk.absolute(info.span)) for info in infos)
+    places = condition_places(db, file, name, given)
+    conditions = tuple(ViewedCondition(equation, chunk.absolute(span)) for span, equation in places)
     around = [c for c in conditions if c.span.start - 1 <= offset <= c.span.end + 1]  # with the brackets
     lit = min(around, key=lambda c: len(c.span)).equation if around else ""
     item = chunk.parsed(db).item

@@ -12,7 +12,7 @@ from msgspec import Struct
 
 from potto.calculus.checking.conditions import Condition, called_by, conditions_of
 from potto.calculus.checking.diffeo import DiffeoInfo, diffeo_info, exported
-from potto.calculus.checking.solvability import ConditionProblem, Verdict, judge
+from potto.calculus.checking.solvability import ConditionProblem, Role, Verdict, judge
 from potto.calculus.explanation.explain import explain_derivative
 from potto.calculus.explanation.layout import DerivativeText, IntegralText
 from potto.calculus.explanation.notation import Notation, written_notation
@@ -116,22 +116,47 @@ def _integrated(term: Term, over: Container[str]) -> Term:
 def condition_infos(db: Database, file: str, name: str, given: Functions = ()) -> tuple[ConditionInfo, ...]:
     """The conditions of a definition, in the order of the text; also those that calls lead to. given: what parameters
     that are functions stand for; without that, calls of these lead to none."""
+    judged = judged_conditions(db, file, name, given)
+    if not judged:
+        return ()
+    parameters, notation = parameters_of(core_term(db, file, name)), written_notation(db, file, name)
+    out: dict[ConditionInfo, None] = {}
+    for span, condition, verdict in judged:
+        moved = tuple(p for p in parameters if p in condition.surface.free)
+        out[_info(notation, span, condition.coordinates, condition.variables, verdict, moved, condition.calls)] = None
+    return tuple(sorted(out, key=lambda info: info.span))
+
+
+@query
+def condition_places(db: Database, file: str, name: str, given: Functions = ()) -> tuple[tuple[Span, str], ...]:
+    """Of the conditions that can be integrated over, where each is written and where its surface is, in the order of
+    the text. What else is known of them, which takes longer to write, is not asked for."""
+    judged = judged_conditions(db, file, name, given)
+    if not judged:
+        return ()
+    notation, found = written_notation(db, file, name), dict[tuple[Span, str], None]()
+    for span, condition, verdict in judged:
+        if isinstance(verdict, Verdict):
+            found[span, shown_equation(condition.surface, condition.variables, notation)] = None
+    return tuple(sorted(found))
+
+
+@query
+def judged_conditions(
+    db: Database, file: str, name: str, given: Functions = ()
+) -> tuple[tuple[Span, Condition, Verdict | ConditionProblem], ...]:
+    """The conditions of a definition that it writes itself or leads to, with their places in its chunk, and whether
+    they can be integrated over; none of one that is not sound."""
     if not is_sound(db, file, name):
         return ()
-    elaborated = core(db, file, name)
-    spans = dict(elaborated.origins)
-    parameters, notation = parameters_of(elaborated.term), written_notation(db, file, name)
-    out: dict[ConditionInfo, None] = {}
+    spans, found = dict(core(db, file, name).origins), list[tuple[Span, Condition, Verdict | ConditionProblem]]()
     for condition in conditions(db, file, name, given):
         span = spans.get(condition.anchor)
         if span is None or any(isinstance(n, Hole) for c in condition.coordinates for n in postorder(c)):
             continue
-        moved = tuple(p for p in parameters if p in condition.surface.free)
-        verdict = judge(
-            condition.coordinates, condition.variables, condition.box, role="delta" if condition.delta else "bracket"
-        )
-        out[_info(notation, span, condition.coordinates, condition.variables, verdict, moved, condition.calls)] = None
-    return tuple(sorted(out, key=lambda info: info.span))
+        role: Role = "delta" if condition.delta else "bracket"
+        found.append((span, condition, judge(condition.coordinates, condition.variables, condition.box, role=role)))
+    return tuple(found)
 
 
 def _info(
