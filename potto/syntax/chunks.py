@@ -30,6 +30,7 @@ _ITEM = re.compile(
 )
 """The start of a line in the first column that is not part of an expression."""
 _BLOCK = re.compile(r"(?:#[^\n]*\n)*(?:def|diffeo|for)\b")
+_IMPORT = re.compile(r"(?:#[^\n]*\n)*(?:from|import)\b")  # whose `*` is no operator
 _LET, _IN = re.compile(r"\blet\b"), re.compile(r"(?<![\w.])in\Z")
 _INDENTED = re.compile(r"\n[^\S\n]+[^\s]")
 _PIECE = re.compile(rf"\n((?:#.*\n)*)(?={_ITEM.pattern})")
@@ -159,8 +160,11 @@ def _is_body(text: str, chunk: int, end: int) -> bool:
 
 def _awaits_operand(text: str, chunk: int, begin: int, end: int) -> bool:
     """Whether the line of code from `begin` to `end` ends with an operator, and is no line of a block."""
-    in_block = text[begin].isspace() and _BLOCK.match(text, chunk + (text[chunk] == "\n")) is not None
-    return not in_block and awaits_operand(text, chunk, end)
+    if not awaits_operand(text, chunk, end):
+        return False
+    start = chunk + (text[chunk] == "\n")
+    in_block = text[begin].isspace() and _BLOCK.match(text, start) is not None
+    return not in_block and _IMPORT.match(text, start) is None
 
 
 def goes_on(text: str, line: str) -> bool:

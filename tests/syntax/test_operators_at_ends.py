@@ -75,6 +75,7 @@ def test_what_starts_an_item_or_stands_below_a_block_is_no_operand() -> None:
         "a = 1 +\ndef f(x) x\n",
         "def f(x)\n    x +\n2\n",
         "f: Real ->\n2\n",
+        "from m import *\n2\n",
     ):
         assert len(split(program)) == 2
 
