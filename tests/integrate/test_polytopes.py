@@ -9,6 +9,7 @@ from __future__ import annotations
 import itertools
 import math
 
+import mpmath as mp
 import pytest
 
 import potto
@@ -51,3 +52,23 @@ def test_kinks_in_conditions_are_no_planes() -> None:
     found = potto.deriv(potto.compile(text).f)((0.8, 1.0))
     assert abs(found.value - 4 / 3 * 0.8**3) <= found.error <= 1e-8
     assert abs(found.tangent - 4 * 0.8**2) <= found.tangent_error <= 1e-8
+
+
+@pytest.mark.parametrize(("n", "most"), [(2, 100), (3, 500), (4, 100_000)])
+@pytest.mark.parametrize("sense", ["<", ">"])
+def test_a_greatest_less_a_least_is_compared_as_each_difference_is(n: int, most: int, sense: str) -> None:
+    """The chance that n numbers in [0, 1] are all within t of each other is n t^(n-1) - (n-1) t^n."""
+    t, names = 0.4, ", ".join(NAMES[:n])
+    chance, rate = n * t ** (n - 1) - (n - 1) * t**n, n * (n - 1) * (t ** (n - 2) - t ** (n - 1))
+    if sense == ">":
+        chance, rate = 1 - chance, -rate
+    check(over(n, f"[max({names}) - min({names}) {sense} t]"), t, chance, rate, most)
+
+
+def test_differences_of_normal_numbers() -> None:
+    """The range of three: 3 int phi(x) (Phi(x + t) - Phi(x))^2 dx."""
+    f = potto.compile("def f(t) integral (a ~ normal(0, 1), b ~ normal(0, 1), c ~ normal(0, 1)) "
+                      "[max(a, b, c) - min(a, b, c) < t] d(a, b, c)").f  # fmt: skip
+    found = f(1.0)
+    true = 3 * mp.quad(lambda x: mp.npdf(x) * (mp.ncdf(x + 1) - mp.ncdf(x)) ** 2, [-10, -3, 0, 3, 10])
+    assert abs(found.value - true) <= found.error <= 1e-11

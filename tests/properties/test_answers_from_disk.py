@@ -28,7 +28,7 @@ def test_random_programs_answer_the_same_from_disk(
 
 
 def answer(number: int) -> tuple[str, int]:
-    """The dual in a process that knows nothing yet, and how many kernels were found on disk."""
+    """The dual in a process that knows nothing yet, or why there is none, and how many kernels were found on disk."""
     kernels.clear()
     problem.clear()
     p = where(number)
@@ -36,6 +36,6 @@ def answer(number: int) -> tuple[str, int]:
         try:
             found = potto.deriv(potto.compile(random_program(number)[0]).f)((p.t, p.dt), (p.s, p.ds))
         except potto.PottoError as error:
-            return str(error), 0
+            return repr([(said.code, said.message) for said in error.diagnostics]), 0  # texts are numbered
     numbers = (found.value, found.error, found.tangent, found.tangent_error, found.evals, found.converged)
     return repr(numbers), found.stats["kernels from disk"]

@@ -9,6 +9,7 @@ greater.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 
 from potto.calculus.algebra.ranges import positive
@@ -42,6 +43,7 @@ from potto.primitives import PRIMITIVES
 _FLAT = ("max", "min", "clamp")
 _EXTREME = frozenset(op for op, entry in PRIMITIVES.items() if op in ("max", "min") or entry.extremes)
 MOST = 8  # cases that one condition is taken apart into
+MOST_TOGETHER = 36  # conditions that one on several greatests and leasts is: of n of two each there would be 2^n
 
 
 def cased(term: Integral) -> Integral:
@@ -155,8 +157,8 @@ def _settled(node: Term, names: frozenset[str], most: int) -> Term:
         return node
     (surface,) = node.coordinates
     chosen = _outermost(surface)
-    if len(chosen) == 1:  # of n in one sum there would be 2^n conditions
-        (part,) = chosen
+    if len(chosen) == 1 or _together(surface, chosen):
+        part = chosen[0]
         written = PRIMITIVES[part.op].extremes
         extreme = part if written is None else written(*part.args)
         rises = _direction(surface, part) if part.op in _EXTREME else 0
@@ -166,6 +168,16 @@ def _settled(node: Term, names: frozenset[str], most: int) -> Term:
             if every or written is None or not all(arg.free for arg in extreme.args):
                 return _one_by_one(node, part, extreme.args, every, names, most)
     return _apart(node, most) if _changes(node, names) else node
+
+
+def _together(surface: Term, chosen: Sequence[Prim]) -> bool:
+    """Whether a condition on several greatests and leasts holds where all of few conditions on their arguments do, or
+    where one of them does."""
+    if not chosen or not all(part.op in ("max", "min") for part in chosen):
+        return False
+    rises = [_direction(surface, part) for part in chosen]
+    every = {(part.op == "max") == (sign < 0) for part, sign in zip(chosen, rises, strict=True)}
+    return all(rises) and len(every) == 1 and math.prod(len(part.args) for part in chosen) <= MOST_TOGETHER
 
 
 def _one_by_one(node: Branch, part: Term, args: Sequence[Term], every: bool, names: frozenset[str], most: int) -> Term:

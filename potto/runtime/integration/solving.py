@@ -39,6 +39,7 @@ from potto.runtime.integration.methods.attempts import (
 )
 from potto.runtime.integration.methods.choices import (
     endless,
+    few_planes,
     many,
     many_variables,
     passes_on,
@@ -58,6 +59,10 @@ from potto.runtime.integration.problem import Problem
 # there is: a torus takes 2.8 times as many evaluations, and tables of it 8 times. How uncertain a trial may leave an
 # answer for that to be done at once: of a torus 1e-3 in the order to take and 0.3 in the others, of an arm 1e-10.
 LONGER, PROMISING = 4, 1e-2
+# Evaluations for rules in four variables where samples are to be drawn: of 12 polytopes of random planes rules ended
+# with 2 to 4 planes (2,000 to 220,000 evaluations), and with the 12 of all differences (58,000), to all digits.
+# Where they did not it took as long as the samples, with 12 planes 4 s.
+GLANCE = 200_000
 
 Method = Callable[[Problem], Sums | None]
 Improver = Callable[[Problem, Integral, Sums], Sums]
@@ -89,6 +94,11 @@ def by_samples(problem: Problem) -> Sums | None:
     """All variables at once, where that was asked for, or where they are too many for rules."""
     if placed_along(problem.term) is not None or not (problem.machine.settings.sampled or too_many(problem)):
         return None
+    if few_planes(problem):
+        found = attempted(problem, problem.term, GLANCE)
+        if not found.stopped and found.known and not found.events.every(Degenerate):
+            problem.machine.record.methods.add("quadrature")
+            return finished(problem, found)
     return _drawn(problem)
 
 

@@ -10,6 +10,7 @@ import math
 from collections.abc import Iterable, Iterator
 from functools import lru_cache
 
+from potto.calculus.algebra.affine import affine
 from potto.calculus.decomposition.elimination import eliminable
 from potto.calculus.differentiation.level_sets import placed_along
 from potto.calculus.solving.enclosable import slope_of
@@ -48,6 +49,16 @@ def too_many(problem: Problem) -> bool:
     if settings.method != "auto" or len(term.variables) <= MOST_LEVELS or placed_along(term) is not None:
         return False
     return settings.rtol >= LOOSE or expected(problem) > AFFORDABLE
+
+
+def few_planes(problem: Problem) -> bool:
+    """Whether so few variables are cut by planes alone that rules may do after all: how many of these cut one another
+    inside is not expected, but met."""
+    settings, term = problem.machine.settings, problem.term
+    if settings.sampled or settings.rtol >= LOOSE or problem.batch > 1 or len(term.variables) > MOST_LEVELS + 1:
+        return False
+    cuts = {cut.surface for own in problem.plan().levels for cut in own.level.cuts}
+    return all(affine(surface, term.variables) is not None for surface in cuts)
 
 
 def many(problem: Problem) -> bool:
