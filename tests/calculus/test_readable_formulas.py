@@ -13,7 +13,7 @@ from potto.calculus.explanation.readable import readable
 from potto.checking.facts import derivative_facts
 from potto.checking.library import Library
 from potto.core.printer import format_term
-from potto.core.terms import add, mul, prim, sub, var
+from potto.core.terms import ONE, ZERO, add, branch, mul, prim, sub, var
 from potto.syntax import parse_expression
 
 PROGRAMS = [
@@ -118,6 +118,12 @@ def test_factors_whose_sign_is_known_inside_an_integral_are_left_out(program: st
     library = Library()
     file = library.put("<text>", program + "\n")
     assert read in explain_derivative(library.db, file, "f").tangent
+
+
+def test_a_bracket_that_is_taken_from_one_is_what_holds_elsewhere() -> None:
+    b = branch((sub(var("t"), var("x")),), True, ONE, ZERO)
+    assert format_term(readable(mul(var("x"), sub(ONE, b)), frozenset())) == "x*[t <= x]"
+    assert format_term(readable(mul(var("x"), sub(b, ONE)), frozenset())) == "-x*[t <= x]"
 
 
 def test_a_sign_that_conditions_tell_is_not_written() -> None:

@@ -128,6 +128,30 @@ ROWS: list[tuple[str, str, str, float, tuple[float, float]]] = [
         "integral ([0, 1], [0, x + t]) [y < x]*(x + t) d(x, y)",
         0.4, (1 / 3 + 0.2, 0.5),
     ),
+    (
+        "a sum of integrals over one region",
+        "integral [-1, 1] ((integral [-1, 1] [x^2 + y^2 < t] d(y)) + (integral [-1, 1] x^2*s^2 d(s))) d(x)",
+        f"integral {SQUARE} ([x^2 + y^2 < t] + x^2*y^2) d(x, y)",
+        0.9, (ball(2, 0.9)[0] + 4 / 9, math.pi),
+    ),
+    (
+        "a function of the outer variable beside one",
+        "integral [-1, 1] x^2*(3 - 2*(integral [-1, 1] [x^2 + y^2 < t] d(y))) d(x)",
+        f"integral {SQUARE} x^2*(3/2 - 2*[x^2 + y^2 < t]) d(x, y)",
+        0.9, (2 - math.pi * 0.9**2 / 2, -math.pi * 0.9),
+    ),
+    (
+        "a sum of integrals over regions of their own",
+        "integral [0, 1] (2*(integral [0, x] [y < t] d(y)) - (integral [0, 1] [x + y < t] d(y))/2) d(x)",
+        "(2*(integral ([0, 1], [0, x]) [y < t] d(x, y)) - (integral ([0, 1], [0, 1]) [x + y < t] d(x, y))/2)",
+        0.4, (2 * 0.4 - 1.25 * 0.4**2, 2 - 2.5 * 0.4),
+    ),
+    (
+        "measures, and a function of the outer number",
+        "integral (x ~ normal(t, 1)) ((integral (y ~ normal(x, 0.5)) [y < 0.3] d(y)) + x^2) d(x)",
+        "(integral (x ~ normal(t, 1), y ~ normal(x, 0.5)) [y < 0.3] d(x, y)) + (integral (x ~ normal(t, 1)) x^2 d(x))",
+        0.4, rate_of(lambda t: mp.ncdf((mp.mpf(0.3) - t) / mp.sqrt(1.25)) + 1 + t * t, 0.4),
+    ),
 ]  # fmt: skip
 IDS = [row[0] for row in ROWS]
 
@@ -205,6 +229,11 @@ def test_what_is_found_once_is_not_found_where_no_side_asks_for_it() -> None:
 def test_a_nonlinear_function_of_an_inner_integral_stays() -> None:
     answer = asked("integral [0, 1] exp(integral [0, 1] [y < x*t] d(y)) d(x)", 0.4)
     holds(answer, rate_of(lambda t: mp.expm1(t) / t, 0.4))
+
+
+def test_a_sum_that_alone_is_finite_is_not_taken_apart() -> None:
+    answer = asked("integral [0, 1] ((integral [0, x] cos(t*y)/x^2 d(y)) - 1/x) d(x)", 0.7)
+    holds(answer, rate_of(lambda t: mp.quad(lambda x: (mp.sin(t * x) / (t * x) - 1) / x, [0, 1]), 0.7))
 
 
 def test_second_derivatives() -> None:

@@ -87,7 +87,10 @@ def _apart(node: If | Branch, tangents: frozenset[str]) -> Term:
 
 def sums_of_choices(node: Prim, tangents: frozenset[str]) -> Iterator[tuple[If | Branch, Term, Term, Term]]:
     """A choice in a sum, with what summands come to on either side of it, and the others: first of those summands that
-    choose by the same condition, then of all."""
+    choose by the same condition, then of all. What a bracket is taken from, 1 - [x < t], it chooses as well."""
+    if (bracket := _taken_from_one(node)) is not None:
+        yield bracket, ZERO, node.args[0] if isinstance(node.args[0], Const) else node.args[1], ZERO
+        return
     parts = [(arg, *_chosen(arg, tangents)) for arg in node.args]
     first = next((choice for _, choice, _ in parts if choice is not None), None)
     if first is None:
@@ -102,6 +105,15 @@ def sums_of_choices(node: Prim, tangents: frozenset[str]) -> Iterator[tuple[If |
         yield first, then, orelse, add(*others)
     if others and all(not isinstance(part, If | Branch) for arg in others for part in postorder(arg)):
         yield first, add(then, *others), add(orelse, *others), ZERO
+
+
+def _taken_from_one(node: Prim) -> Branch | None:
+    """The bracket b of a sum that is 1 - b or b - 1."""
+    for one, other in (node.args, node.args[::-1]) if len(node.args) == 2 else ():
+        bracket = neg(other) if one is ONE else other
+        if one in (ONE, neg(ONE)) and isinstance(bracket, Branch) and bracket.then is ONE and bracket.orelse is ZERO:
+            return bracket
+    return None
 
 
 def _chosen(term: Term, tangents: frozenset[str]) -> tuple[If | Branch | None, Term]:

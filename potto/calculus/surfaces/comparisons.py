@@ -8,33 +8,38 @@ brackets is their product, the greatest their union, and so for whatever lies be
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from fractions import Fraction
+
 from potto.calculus.algebra.ranges import nonnegative, range_of
 from potto.calculus.surfaces.domains import ends_of_domain
-from potto.core.terms import ONE, Branch, Const, Prim, Term, branch, mul, neg, prim, sub
+from potto.core.collecting import split
+from potto.core.terms import ONE, Branch, Const, Prim, Term, branch, const, mul, neg, prim, sub
 from potto.primitives import PRIMITIVES
 
 
 def of_arguments(node: Branch) -> Term:
-    """A condition on f(a) - f(b) as one on a - b, or b - a where f falls; the same one where that may say more, beyond
-    where f is defined."""
+    """A condition on k*f(a) - k*f(b) as one on a - b, or b - a where k*f falls; the same one where that may say more,
+    beyond where f is defined."""
     match node.coordinates:
-        case (Prim(op="add", args=(first, Prim(op="neg", args=(second,)))),):
-            surface = _of_arguments(first, second)
-        case (Prim(op="add", args=(Prim(op="neg", args=(second,)), first)),):
-            surface = _of_arguments(first, second)
+        case (Prim(op="add", args=(first, second)),):
+            surface = _of_arguments(split(first), split(second))
         case _:
             surface = None
     return node if surface is None else branch((surface,), node.strict, node.then, node.orelse)
 
 
-def _of_arguments(first: Term, second: Term) -> Term | None:
-    """What has the sign of a difference."""
-    match first, second:
+def _of_arguments(first: tuple[Fraction, Term], second: tuple[Fraction, Term]) -> Term | None:
+    """What has the sign of a sum of two, each a number times a term."""
+    if first[0] != -second[0]:
+        return None
+    above, below = (first[1], second[1]) if first[0] > 0 else (second[1], first[1])
+    match above, below:
         case Prim(op="div", args=(one, a)), Prim(op="div", args=(other, b)) if one is ONE and other is ONE:
             return mul(sub(b, a), b) if nonnegative(a) else mul(sub(b, a), a) if nonnegative(b) else None
         case Prim(op=op, args=(a,)), Prim(op=same, args=(b,)) if op == same:
             rises = PRIMITIVES[op].increasing
-            defined = not (ends_of_domain(first) or ends_of_domain(second))
+            defined = not (ends_of_domain(above) or ends_of_domain(below))
             return (sub(a, b) if rises > 0 else sub(b, a)) if rises and defined else None
     return None
 
@@ -66,18 +71,48 @@ def by_signs(node: Term, variables: frozenset[str]) -> Term:
 
 
 def by_brackets(term: Term) -> Term:
-    """A least or a greatest with a bracket between two numbers in it, where all else lies between these."""
+    """A least or a greatest in which a bracket that chooses between two numbers decides on one of its sides: all else
+    is no greater than the greater of these in a greatest, no less than the less in a least. The brackets are asked in
+    the order of these numbers, each once."""
     if not isinstance(term, Prim) or term.op not in ("min", "max"):
         return term
-    for place, bracket in enumerate(term.args):
-        match bracket:
-            case Branch(then=Const(value=then), orelse=Const(value=orelse)):
-                others = term.args[:place] + term.args[place + 1 :]
-                rest = by_brackets(others[0] if len(others) == 1 else prim(term.op, *others))
-                between = range_of(rest)
-                lo, hi = sorted((then, orelse))
-                if lo <= between.lo and between.hi <= hi:
-                    wide = (then > orelse) == (term.op == "min")  # where the bracket holds, the rest decides
-                    sides = (rest, bracket.orelse) if wide else (bracket.then, rest)
-                    return branch(bracket.coordinates, bracket.strict, *sides)
+    args = [_scaled_in(arg) for arg in term.args]
+    brackets = {place: found for place, arg in enumerate(args) if (found := _between_numbers(arg)) is not None}
+    if not brackets:
+        return term
+    greatest = term.op == "max"
+    most, least = (max, min) if greatest else (min, max)
+    place = most(brackets, key=lambda at: most(brackets[at][1:]))
+    bracket, then, orelse = brackets[place]
+    decides, other = most(then, orelse), least(then, orelse)
+    others = args[:place] + args[place + 1 :]
+    between = range_of(_extreme(term.op, others))
+    if between.hi > decides if greatest else between.lo < decides:
+        return term
+    if other > between.lo if greatest else other < between.hi:
+        others.append(const(other))
+    rest = by_brackets(_extreme(term.op, others))
+    sides = (const(decides), rest) if then == decides else (rest, const(decides))
+    return branch(bracket.coordinates, bracket.strict, *sides)
+
+
+def _extreme(op: str, args: Sequence[Term]) -> Term:
+    return args[0] if len(args) == 1 else prim(op, *args)
+
+
+def _scaled_in(term: Term) -> Term:
+    """A bracket between numbers that a number scales as one between what these come to."""
+    scale, inner = split(term)
+    match _between_numbers(inner):
+        case (bracket, then, orelse):
+            sides = const(float(scale) * then), const(float(scale) * orelse)
+            return branch(bracket.coordinates, bracket.strict, *sides)
     return term
+
+
+def _between_numbers(term: Term) -> tuple[Branch, float, float] | None:
+    """A bracket and the two numbers that it chooses between."""
+    match term:
+        case Branch(then=Const(value=then), orelse=Const(value=orelse)):
+            return term, then, orelse
+    return None

@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from functools import lru_cache
 
 from potto.calculus.decomposition.guards import guarded_outside
-from potto.calculus.decomposition.joined import joined
+from potto.calculus.decomposition.joined import in_joined_summands, joined
 from potto.calculus.differentiation.deltas import without_deltas
 from potto.calculus.differentiation.derivative import NotSmooth, total, zero_like
 from potto.calculus.differentiation.dual import Differentiator
@@ -85,6 +85,8 @@ def prepared(term: Integral, reach: Reach) -> Term:
         return term
     if (outside := guarded_outside(term)) is not term:
         return outside
+    if summands := in_joined_summands(term, reach.resolve):
+        return add(*summands)
     body = term.body
     if isinstance(body, Sum) and not (body.lo.free | body.hi.free) & set(term.variables):
         return with_summand(body, with_integrand(term, body.body))
