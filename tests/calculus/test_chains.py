@@ -12,6 +12,7 @@ KINDS = {
     "in the condition": "def f{0}(x, t) if [f{1}(x, t) > {0}/100] then x + t else x - t",
     "as a bracket": "def f{0}(x, t) [f{1}(x, t) + x > {0}/100]",
     "a state": "def f{0}(x, t) 0.8*f{1}(x, t) + 0.5*[f{1}(x, t) < t]",
+    "an integral in the condition": "def f{0}(x, t) x*(integral [0, 1] [y < f{1}(t, t)] d(y))",
     "a product": "def f{0}(x, t) f{1}(x, t)*[f{1}(x, t) > t]",
 }
 

@@ -20,6 +20,7 @@ from potto.calculus.algebra.point_values import sample_value
 from potto.calculus.differentiation.loops import parts_below
 from potto.calculus.inlining.currying import arguments_of, groups_of, sizes_of, uncurry
 from potto.calculus.inlining.expand import MOST_NAMES, Expansion, Resolve, expanded
+from potto.calculus.inlining.numbers import IntegralsAsParameters
 from potto.calculus.surfaces.trace import spine
 from potto.core.terms import (
     ONE,
@@ -207,7 +208,7 @@ class _Walk:
         self.seen: set[tuple[object, ...]] = set()
         self.taken: set[str] = set()
         self.met: list[tuple[Branch | Delta, _Place]] = []
-        self.expansion = Expansion(whole)
+        self.expansion = Expansion(whole, stands_for=IntegralsAsParameters(whole, self.box))
         self.calls = Holding(App)
 
     def term(self, term: Term, place: _Place) -> None:
@@ -283,8 +284,7 @@ class _Walk:
         if key in self.seen or len(self.seen) >= MOST_CALLS:
             return
         self.seen.add(key)
-        inner = self.entered(function, given, place)
-        if inner is not None:
+        if (inner := self.entered(function, given, place)) is not None:
             body, mapping, functions, names = inner
             there = _Place(mapping, functions, (*place.calls, name), path, place.anchor or node, caller, names)
             self.term(body, there)
