@@ -55,6 +55,7 @@ from potto.runtime.integration.methods.choices import many, preferred, to_be_see
 from potto.runtime.integration.preparation.arrays import met
 from potto.runtime.integration.preparation.found_once import finds_once
 from potto.runtime.integration.preparation.prepared import filled, placed, prepared
+from potto.runtime.integration.preparation.unions import in_parts
 from potto.runtime.integration.problem import MOST_LOOKED_AT, Mixed, Problem, linked
 from potto.runtime.integration.settled_calls import Batches, SettledCall, SweptCall, unused
 from potto.runtime.integration.solving import solve
@@ -217,6 +218,8 @@ class Direct(Struct, frozen=True):
             again = machine.directions > 0
             if placed(term, again, reach) is not term or prepared(term, reach) is not term:
                 return None
+            if in_parts(machine, term, env) is not term:
+                raise _Passed
             problem = Problem(machine.apart(), term, *linked(env), solve, members, True)
             if many(problem):
                 return None

@@ -34,6 +34,7 @@ from potto.runtime.integration.preparation.found_once import finds_once, with_fo
 from potto.runtime.integration.preparation.prepared import filled, held, placed, prepared
 from potto.runtime.integration.preparation.recursions import in_sight
 from potto.runtime.integration.preparation.taken_apart import together
+from potto.runtime.integration.preparation.unions import in_parts
 from potto.runtime.integration.problem import Mixed, Problem, linked
 from potto.runtime.integration.solving import solve
 
@@ -84,6 +85,8 @@ def _of_numbers(machine: Machine, term: Integral, env: dict[str, Value]) -> Valu
             ready = in_factors(term)
             if ready is not term:  # sums of products are not products of sums
                 machine = machine.changed(into=None, of=None)
+    if ready is term:
+        ready = in_parts(machine, term, env)
     if ready is not term:
         if derived and not machine.directions:
             note_rims(machine, term, env)
