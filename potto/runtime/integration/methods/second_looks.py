@@ -47,7 +47,8 @@ def by_less(problem: Problem, order: Integral, sums: Sums) -> Sums:
         return sums
     if not machine.exhausted() or machine.overdrawn() or uncertainty(sums) <= ENOUGH or machine.inexact(plan.term.body):
         return sums
-    for rtol in TOLERANCES:
+    beyond = machine.record.spent > (1 + EXTRA) * machine.settings.max_evals
+    for rtol in TOLERANCES[-1:] if beyond else TOLERANCES:
         most = math.ceil(machine.record.spent + EXTRA * machine.settings.max_evals)
         settings = replace(machine.settings, rtol=max(rtol, machine.rtol), max_evals=most)
         loose = machine.apart().changed(settings=settings)
