@@ -50,12 +50,12 @@ PAIRS += [("max of twelve", DISCS, f"[max({', '.join(SIDES)}) < t]", "*".join(f"
            (12 * math.tan(math.pi / 12) * T**2, 24 * math.tan(math.pi / 12) * T))]  # fmt: skip
 
 APART = [f"{0.4 * T!r}*t - (x - {x})^2 - (y - {y})^2" for x, y in ((-1, -1), (1, -1.1), (-1.1, 1), (0.9, 1.2))]
+ADDED = "(" + " + ".join(f"[{d} > 0]" for d in APART) + ")"
+FOUR = 1.6 * math.pi * T**2, 1.6 * math.pi * T
 PAIRS += [
-    ("discs apart", DISCS, f"[{' or '.join(f'{d} > 0' for d in APART)}]", f"({' + '.join(f'[{d} > 0]' for d in APART)})",
-     (1.6 * math.pi * T**2, 1.6 * math.pi * T)),
-    ("greatest of functions apart", DISCS, f"[max({', '.join(APART)}) > 0]",
-     f"({' + '.join(f'[{d} > 0]' for d in APART)})", (1.6 * math.pi * T**2, 1.6 * math.pi * T)),
-]  # fmt: skip
+    ("discs apart", DISCS, f"[{' or '.join(f'{d} > 0' for d in APART)}]", ADDED, FOUR),
+    ("greatest of functions apart", DISCS, f"[max({', '.join(APART)}) > 0]", ADDED, FOUR),
+]
 
 OTHERWISE = ("min", "abs that is larger", "clamp that is flat", "discs joined")  # one surface, and not two or none
 
