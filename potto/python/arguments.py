@@ -20,10 +20,11 @@ from potto.diagnostics import PottoError, declare
 from potto.kernels.cells import Cell, Rows, Value, listed
 from potto.kernels.errors import wrong_call
 from potto.kernels.memory import apart, copied
-from potto.python.arrays import answers_in, batch_shapes, halves, holds_functions, over_batch
+from potto.python.arrays import answers_in, batch_shapes, halves, over_batch
 from potto.runtime.answers.estimate import Estimate
 from potto.runtime.answers.named import alike
 from potto.runtime.answers.printing import format_digits
+from potto.runtime.answers.shown import holds_functions
 from potto.source import Span
 from potto.types import format_type
 from potto.types.types import ArrayOf, Diffeo, Dist, Function, Real, TupleOf, Type, resolve, result_of

@@ -18,6 +18,7 @@ from potto.kernels.cells import Cell, Rows, Value, all_cells, listed, map_cells,
 from potto.kernels.errors import wrong_call
 from potto.reports.near import near_names
 from potto.runtime.answers.estimate import Estimate
+from potto.runtime.answers.shown import holds_functions
 from potto.types import format_type
 from potto.types.types import ArrayOf, Count, Dist, Real, RecordName, Shifted, SizeVar, TupleOf, Type, resolve
 
@@ -215,11 +216,6 @@ def answers_in(answer: Estimate) -> tuple[Estimate, ...] | list[Estimate] | None
 def halves(dual: Estimate) -> tuple[Estimate, Estimate]:
     """The value and the tangent of an answer that is a dual, each with its own error."""
     return Estimate(dual.value, dual.error), Estimate(dual.tangent, dual.tangent_error)
-
-
-def holds_functions(value: Any) -> bool:
-    """Whether there are functions in an answer, of which it has the places alone."""
-    return value is None or (isinstance(value, tuple | list) and any(map(holds_functions, value)))
 
 
 def _of_numbers(type: Type) -> bool:

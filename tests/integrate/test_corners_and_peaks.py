@@ -35,6 +35,8 @@ NARROW = [
      lambda t: math.exp(t)*((1 - math.exp(-2*t))/2 + 1e6/(1e6 + 2)) - (1 - math.exp(-t)) - 1e6/(1e6 + 1)),
     ("[0, t], [0, 1], [0, 1], [0, 1]", "(1 + 1e6*exp(-1e6*x))*exp(y*z*w)",
      lambda t: (t + 1)*float(mp.nsum(lambda n: 1/(mp.factorial(n)*(n + 1)**3), [0, mp.inf]))),
+    # of a sum nothing is read off: nodes at the ends have to see it
+    ("[0, t], [0, 1]", "(1 + (sum k in 1..3 (1e6*k*exp(-1e6*k*x))))*exp(y)", lambda t: (t + 3)*(math.e - 1)),
 ]  # fmt: skip
 
 

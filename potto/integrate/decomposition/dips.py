@@ -15,8 +15,8 @@ import numpy as np
 
 from potto.calculus.solving.enclosable import enclosable
 from potto.core.terms import Const, Prim, Term, postorder
-from potto.integrate.decomposition.lines import Watched, apart, box_of, on_lines
-from potto.integrate.decomposition.meetings import Row, as_array
+from potto.integrate.decomposition.lines import Watched, apart, box_of, extent, on_lines
+from potto.integrate.decomposition.meetings import Row
 from potto.integrate.decomposition.turns import Span, cells_of
 from potto.integrate.levels import HINT, LevelPlan
 from potto.integrate.pieces import Evaluator
@@ -72,9 +72,7 @@ def dip_rows(
     batch: int, machine: Evaluator,
 ) -> list[Row]:  # fmt: skip
     """Rows around the places within the ranges of members where one of the terms comes near to 0."""
-    ends = np.stack([as_array(end.v, batch) for end in (lo, hi)])
-    low, high = ends.min(axis=0), ends.max(axis=0)
-    there = np.flatnonzero(high > low)
+    low, high, there = extent(lo, hi, batch)
     if not there.size or not _dips_somewhere(terms, inner, variable, env, (low[there].min(), high[there].max())):
         return []
     search = _Search(terms, inner, variable, env, machine, Span(low, high, np.zeros(batch)))
@@ -95,8 +93,8 @@ def _dips_somewhere(
     terms: Watched, inner: Sequence[LevelPlan], variable: str, env: Mapping[str, Value], ends: tuple[float, float]
 ) -> bool:
     """Whether a term may come near to 0 for some member, as far as an enclosure over all of them tells."""
-    box = box_of(inner, variable, env, ends)
-    if box is None or any(not term.free <= box.keys() for term in terms.terms):
+    box = box_of(terms, inner, variable, env, ends)
+    if box is None:
         return True
     if not np.isfinite(ends).all():
         box[variable] = cells_of(ends)

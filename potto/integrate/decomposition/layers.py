@@ -16,7 +16,7 @@ import numpy as np
 from msgspec import Struct
 
 from potto.core.terms import Term
-from potto.integrate.decomposition.lines import Watched, apart, box_of, on_lines, watched
+from potto.integrate.decomposition.lines import Watched, apart, box_of, extent, on_lines, watched
 from potto.integrate.decomposition.meetings import Row, as_array
 from potto.integrate.decomposition.turns import Matters, Span, cells_of, span_of, turns
 from potto.integrate.levels import HINT, LevelPlan
@@ -50,9 +50,7 @@ def layer_rows(
     an exponent changes much.
 
     inner: the variables further in. matters: finds how much of the ranges, some infinite, does."""
-    ends = np.stack([as_array(end.v, batch) for end in (lo, hi)])
-    low, high = ends.min(axis=0), ends.max(axis=0)
-    there = np.flatnonzero(high > low)
+    low, high, there = extent(lo, hi, batch)
     if not there.size or not _steep_somewhere(exponents, inner, variable, env, (low[there].min(), high[there].max())):
         return []
     hints = [as_array(row.x, batch)[there] for row in rows if row.cut == HINT]
@@ -80,8 +78,8 @@ def _steep_somewhere(
     exponents: Watched, inner: Sequence[LevelPlan], variable: str, env: Mapping[str, Value], ends: Interval
 ) -> bool:
     """Whether an exponent may be steep for some member, as far as an enclosure over all of them tells."""
-    box = box_of(inner, variable, env, ends)
-    if box is None or any(not e.free <= box.keys() for e in exponents.terms):
+    box = box_of(exponents, inner, variable, env, ends)
+    if box is None:
         return True
     if np.isfinite(ends).all():
         return not change(exponents.terms, box) <= STEEPEST

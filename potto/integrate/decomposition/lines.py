@@ -1,7 +1,7 @@
 """Terms of an integrand along lines: at places of one variable, at parts of the ranges of those further in.
 
-Owns `Watched`, `watched`, `on_lines` and `apart`. What decides where a variable is cut, beside its surfaces, is found
-on few such lines.
+Owns `Watched`, `watched`, `extent`, `box_of`, `on_lines` and `apart`. What decides where a variable is cut, beside its
+surfaces, is found on few such lines.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from msgspec import Struct
 
 from potto.calculus.solving.enclosable import enclosable
 from potto.core.terms import Lam, Term, children, function_of, tuple_
+from potto.integrate.decomposition.meetings import as_array
 from potto.integrate.levels import LevelPlan
 from potto.integrate.pieces import Evaluator, gather, numbers_at, still
 from potto.integrate.rules.intervals import Interval, enclosure
@@ -39,11 +40,18 @@ def watched(terms: Iterable[Term], variable: str, known: frozenset[str]) -> Watc
     return Watched(own, function_of(tuple_(own))) if own else None
 
 
+def extent(lo: Cell, hi: Cell, batch: int) -> tuple[Array, Array, Ints]:
+    """The lower and the upper ends of the ranges of members, and which of these have a length."""
+    ends = np.stack([as_array(end.v, batch) for end in (lo, hi)])
+    low, high = ends.min(axis=0), ends.max(axis=0)
+    return low, high, np.flatnonzero(high > low)
+
+
 def box_of(
-    inner: Sequence[LevelPlan], variable: str, env: Mapping[str, Value], ends: Interval
+    terms: Watched, inner: Sequence[LevelPlan], variable: str, env: Mapping[str, Value], ends: Interval
 ) -> dict[str, Interval] | None:
     """Intervals that hold all numbers of a batch, a variable between its ends, and those further in; None where their
-    ranges can't be enclosed."""
+    ranges can't be enclosed, or the terms name more than these."""
     box: dict[str, Interval] = {}
     for name, value in env.items():
         if isinstance(value, Cell):
@@ -55,7 +63,7 @@ def box_of(
             return None
         (least, _), (_, most) = enclosure((low, high), box)
         box[level.variable] = least, most
-    return box
+    return box if all(term.free <= box.keys() for term in terms.terms) else None
 
 
 def on_lines(

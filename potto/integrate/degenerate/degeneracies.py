@@ -1,7 +1,7 @@
 """Steps where only bends are expected: a surface that runs along a variable further in has no section there.
 
-Owns `seems_to_step`, `steps_at_cuts`, `brush` (at bounds), `beneath` (where another surface is) and `does_jump`. What
-is further in is integrated on both sides of the place. If it jumps, and it is one surface that makes it jump, what
+Owns `seems_to_step`, `steps_at_cuts`, `brush` (at bounds), `beneath` (where another surface is), `beside` and `jumps`.
+What is further in is integrated on both sides of the place. If it jumps, and it is one surface that makes it jump, what
 crosses that face is known (`faces`); else another variable must go innermost.
 """
 
@@ -64,7 +64,7 @@ def steps_at_cuts(work: PanelBatch, whole: Pieces) -> Crossing | None:
     size = np.abs(after[:, 1]) + np.abs(before[:, 1]) + mean[:, right] + mean[:, left]
     # What jumps may come to nothing over the variables further in, as x*y does over an even range of y, but not times
     # the speed, which depends on them.
-    jumps = np.nonzero(does_jump(np.abs(after - before), size) | along)[0]
+    jumps = np.nonzero(_does_jump(np.abs(after - before), size) | along)[0]
     if not jumps.size:
         return None
     left, right = left[jumps], right[jumps]
@@ -153,15 +153,11 @@ def brush(scene: IteratedVariable, cuts: Cuts) -> None:
         if not owner.size or _bends(scene, owner, x, upper):
             continue
         _, (inner,) = around(scene.level, owner, x, (not upper,), scene.env, scene.sides, scene.machine)
-        aside = np.array(BESIDE)[:, None] * (1 + np.abs(x))
-        places = np.concatenate([x + sign * a for a in aside for sign in (1.0, -1.0)])
         many = 2 * len(BESIDE)
         sides: dict[int, Mask] = {g: np.tile(np.broadcast_to(m, owner.shape), many) for g, m in inner.items()}
-        values = _inside(scene, owner, places, sides)
-        above, below = values[:, 0::2], values[:, 1::2]
-        jumps = does_jump(np.abs(above - below), np.abs(above[:, 1]) + np.abs(below[:, 1]))
-        if jumps.any():
-            scene.machine.note(Degenerate(scene.level.variable), scene.below(owner[jumps]))
+        values = _inside(scene, owner, beside(x), sides)
+        if (there := jumps(values)).any():
+            scene.machine.note(Degenerate(scene.level.variable), scene.below(owner[there]))
 
 
 def _inside(scene: IteratedVariable, owner: Ints, x: Array, sides: dict[int, Mask]) -> Array:
@@ -171,7 +167,19 @@ def _inside(scene: IteratedVariable, owner: Ints, x: Array, sides: dict[int, Mas
     return values.reshape(values.shape[0], -1, owner.size)
 
 
-def does_jump(steps: Array, size: Array) -> Bools:
+def beside(x: Array) -> Array:
+    """Places above and below each of some, then such that are nearer, one after the other."""
+    aside = np.array(BESIDE)[:, None] * (1 + np.abs(x))
+    return np.concatenate([x + sign * a for a in aside for sign in (1.0, -1.0)])
+
+
+def jumps(values: Array) -> Bools:
+    """At which of n places something jumps that has these values, (m, places, n), where `beside` looks."""
+    above, below = values[:, 0::2], values[:, 1::2]
+    return _does_jump(np.abs(above - below), np.abs(above[:, 1]) + np.abs(below[:, 1]))
+
+
+def _does_jump(steps: Array, size: Array) -> Bools:
     """Where values on the two sides of a place differ, and no less so nearer to it: what bends would shrink."""
     far, near = steps[:, 0], steps[:, 1]
     return np.asarray(((near > 0.5 * far) & (near > DISCONTINUITY * size)).any(axis=0))

@@ -22,7 +22,7 @@ from potto.core.terms import ZERO, Lam, Term, add, function_of, if_, mul, prim, 
 from potto.integrate.adaptive.iterated import Iteration
 from potto.integrate.decomposition.cuts import Cuts
 from potto.integrate.decomposition.effective_range import reaches
-from potto.integrate.degenerate.degeneracies import BESIDE, does_jump
+from potto.integrate.degenerate.degeneracies import beside, jumps
 from potto.integrate.elimination.interpolants import InterpolantTable, concentration, tabulated
 from potto.integrate.elimination.step_plans import HIGH, LOW, Eliminated
 from potto.integrate.events import SurfaceFold, TwoSided
@@ -233,12 +233,9 @@ def _jumps_at_an_end(found: Cuts, function: Callable[[Array, Array], Sums]) -> b
     ends = np.unique(np.concatenate([np.zeros(0), *(edge.x for edge in (*found.edges, *found.brushes))]))
     if not ends.size:
         return False
-    aside = np.array(BESIDE)[:, None] * (1 + np.abs(ends))
-    places = np.concatenate([ends + sign * a for a in aside for sign in (1.0, -1.0)])
+    places = beside(ends)
     values = function(places, np.zeros((0, places.size))).v
-    values = values.reshape(values.shape[0], -1, ends.size)
-    above, below = values[:, 0::2], values[:, 1::2]
-    return bool(does_jump(np.abs(above - below), np.abs(above[:, 1]) + np.abs(below[:, 1])).any())
+    return bool(jumps(values.reshape(values.shape[0], -1, ends.size)).any())
 
 
 def _spans(

@@ -156,8 +156,9 @@ def gives_dual(term: Term, linker: Linker, env: Mapping[str, Value] = NOTHING) -
     return False
 
 
-def _has_functions(value: Any) -> bool:
-    return value is None or (isinstance(value, tuple | list) and any(map(_has_functions, value)))
+def holds_functions(value: Any) -> bool:
+    """Whether there are functions in an answer, of which it has the places alone."""
+    return value is None or (isinstance(value, tuple | list) and any(map(holds_functions, value)))
 
 
 def as_dual(estimate: Estimate) -> Estimate:
@@ -165,7 +166,7 @@ def as_dual(estimate: Estimate) -> Estimate:
     where one is a function, stay as they are."""
     if not (isinstance(estimate.value, tuple) and len(estimate.value) == 2) or estimate.tangent is not None:
         return estimate
-    if _has_functions(estimate.value):
+    if holds_functions(estimate.value):
         return estimate
     (value, tangent), (error, tangent_error) = estimate.value, estimate.error
     dual = replace(estimate, value=value, error=error, tangent=tangent, tangent_error=tangent_error)

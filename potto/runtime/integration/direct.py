@@ -177,7 +177,7 @@ class Direct(Struct, frozen=True):
         """The parameters of the integral, and its rule; None where there is no such rule."""
         if machine.settings.sampled or (self.dual and machine.directions):
             return {}, None
-        here, functions = self._given(machine, env)
+        here, functions = self._given(env)
         if here is None:
             return {}, None
         key = functions, working.directions > 0
@@ -191,7 +191,7 @@ class Direct(Struct, frozen=True):
                     return here, None
         return here, self.rules[key]
 
-    def _given(self, machine: Machine, env: Mapping[str, Value]) -> tuple[dict[str, Value] | None, tuple[Lam, ...]]:
+    def _given(self, env: Mapping[str, Value]) -> tuple[dict[str, Value] | None, tuple[Lam, ...]]:
         """The parameters of the integral, and the functions among them; None where these are not plain."""
         here: dict[str, Value] = {}
         functions: tuple[Lam, ...] = ()

@@ -152,7 +152,7 @@ class _Steps:
             record = copy(record)
             record.second = False
         machine = self.machine.changed(directions=total, taping=False, rounding=True, record=record)
-        here = {name: pad(value, total) for name, value in self.rest(k).items()}
+        here = {name: pad(value, total) for name, value in self.rest().items()}
         here[self.term.variable] = Cell(self.place, None, (None,) * total)
         here[self.term.state] = self.state(off, k, total)
         with looked_through():
@@ -166,7 +166,7 @@ class _Steps:
         return _Linear(slopes[..., k:], slopes[..., :k], local, errors[..., k:], errors[..., :k],
                        [there for _, there in t[:k]])  # fmt: skip
 
-    def rest(self, k: int) -> Env:
+    def rest(self) -> Env:
         if not self.machine.taping:
             return self.env
         return {name: resting(value) for name, value in self.env.items()}
