@@ -46,7 +46,7 @@ class Batch(Struct, frozen=True):
     @property
     def size(self) -> int:
         """How many members it has."""
-        return 1 if self.shape is None else int(np.prod(self.shape))
+        return 1 if self.shape is None else math.prod(self.shape)
 
     def flat(self, array: np.ndarray[Any, np.dtype[np.float64]]) -> Any:
         """An array as a part of the batch, as a number where that has one member. An empty batch is run with one point,
@@ -56,7 +56,13 @@ class Batch(Struct, frozen=True):
             return np.ones(1)
         if array.size == 1 and math.prod(self.shape) == 1:
             return float(array.item())
+        if array.shape == self.shape and array.flags.c_contiguous:
+            return array.reshape(-1)
         return np.ascontiguousarray(np.broadcast_to(array, self.shape)).reshape(-1)
+
+    def row(self, array: np.ndarray[Any, Any]) -> Any:
+        """The same of an array of any real numbers: it is read by machine code, and written by nobody."""
+        return self.flat(np.require(array, np.float64, ("A", "E")))
 
     def rows(self, part: Any, inner: tuple[int, ...]) -> Any:
         """A part of an array, with axes of places in front, as a part of the batch."""
@@ -128,11 +134,12 @@ class Batch(Struct, frozen=True):
             return float(part)
         if 0 in self.shape:
             return np.empty(self.shape)
-        count, array = int(np.prod(self.shape)), np.asarray(part, dtype=float)
+        count, array = math.prod(self.shape), np.asarray(part, dtype=float)
         if array.ndim > 1 and len(array) == count:  # arrays of members, put together from tiles
             return array.reshape(*self.shape, *array.shape[1:])
-        whole = np.broadcast_to(array.reshape(-1), (count,)).reshape(self.shape)
-        return array.reshape(self.shape) if own and array.size == count and array.flags.carray else copied(whole)
+        if array.size == count:
+            return array.reshape(self.shape) if own and array.flags.carray else copied(array.reshape(self.shape))
+        return copied(np.broadcast_to(array.reshape(-1), (count,)).reshape(self.shape))
 
 
 def batch_of(arguments: Iterable[tuple[str, Any]]) -> Batch:
@@ -238,25 +245,6 @@ def numbers_of(args: tuple[Any, ...]) -> list[Value]:
     return [tuple(numbers_of(arg)) if arg.__class__ is tuple else Cell(float(arg)) for arg in args]
 
 
-def without_axes(args: tuple[Any, ...]) -> tuple[tuple[Any, ...], int]:
-    """Arguments with numbers for arrays of one member, and how many axes these have: the most, 0 if there are none."""
-    axes, numbers = 0, []
-    for arg in args:
-        own = 0
-        if arg.__class__ is np.ndarray and arg.size == 1 and arg.dtype.kind in "fiu":
-            own, arg = arg.ndim, float(arg.item())
-        elif arg.__class__ is tuple:
-            arg, own = without_axes(arg)
-        axes = max(axes, own)
-        numbers.append(arg)
-    return tuple(numbers), axes
-
-
-def with_axes(numbers: Iterable[float], axes: int) -> list[Any]:
-    """Numbers as arrays of one member with so many axes."""
-    return [np.array(number, ndmin=axes) for number in numbers]
-
-
 def _double(name: str, argument: Any) -> float:
     try:
         return float(argument)
@@ -269,7 +257,7 @@ def _array(name: str, argument: np.ndarray[Any, Any], batch: Batch) -> Value:
         raise no_kind(name, argument, "an array must hold real numbers")
     if argument.ndim == 0:
         return Cell(float(argument))
-    return Cell(batch.flat(np.require(argument, np.float64, ("A", "E"))))  # read by machine code, written by nobody
+    return Cell(batch.row(argument))
 
 
 def _estimate(name: str, argument: Estimate, batch: Batch, to_function: ToFunction) -> Value:

@@ -1,9 +1,9 @@
 """Arrays of Python as arrays of Potto: what a parameter's type says which axes of numpy's are.
 
-Owns `with_arrays`, `axes_of`, `over_batch`, `batch_shapes`, `shape_together` and `evenly`. A parameter `[n] Real` takes
-a numpy array, a column of a table or a list as one array, and the axes before those of the array are a batch; a
-parameter `Real` takes a numpy array as a batch. Until all batches are known, the parts of such an array have its axes
-first and then those of its own batch.
+Owns `with_arrays`, `axes_of`, `over_batch`, `batch_shapes`, `shape_together` and `evenly`; `is_one`, `without_axes` and
+`with_axes`: arrays of one member as numbers. A parameter `[n] Real` takes a numpy array, a column of a table or a list
+as one array, and the axes before those of the array are a batch; a parameter `Real` takes a numpy array as a batch.
+Until all batches are known, the parts of such an array have its axes first and then those of its own batch.
 """
 
 from __future__ import annotations
@@ -36,6 +36,30 @@ def shape_together(arguments: Sequence[Any]) -> tuple[int, ...] | None:
     with contextlib.suppress(ValueError):
         return np.broadcast_shapes(*shapes) if shapes else None
     return None
+
+
+def is_one(argument: Any) -> bool:
+    """Whether an argument is an array of one real number."""
+    return argument.__class__ is np.ndarray and argument.size == 1 and argument.dtype.kind in "fiu"
+
+
+def without_axes(args: tuple[Any, ...]) -> tuple[tuple[Any, ...], int]:
+    """Arguments with numbers for arrays of one member, and how many axes these have: the most, 0 if there are none."""
+    axes, numbers = 0, []
+    for arg in args:
+        own = 0
+        if is_one(arg):
+            own, arg = arg.ndim, float(arg.item())
+        elif arg.__class__ is tuple:
+            arg, own = without_axes(arg)
+        axes = max(axes, own)
+        numbers.append(arg)
+    return tuple(numbers), axes
+
+
+def with_axes(numbers: Sequence[float], axes: int) -> list[Any]:
+    """Numbers as arrays of one member with so many axes."""
+    return [*np.array(numbers).reshape(-1, *(1,) * axes)]  # in a third of the time that an array for each takes
 
 
 def with_arrays(name: str, argument: Any, type: Type, sizes: Sizes) -> Any:

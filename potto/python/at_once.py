@@ -3,7 +3,7 @@
 Owns `AtOnce` and `at_once`, and for batches `Together` and `together`. Where a call is nothing but an integral, or
 arithmetic with some, and all about them is settled in the region where its numbers lie (`proved_sums/settled`), the
 general way has nothing left to find out. What it told once about such a call, it would tell again. A batch of numbers
-goes from its arrays to the integral.
+goes from its arrays to the integral, or to the kernel where there is none.
 """
 
 from __future__ import annotations
@@ -16,13 +16,14 @@ from typing import Any, Literal
 from msgspec import Struct
 from msgspec.structs import asdict, replace
 
-from potto.core.terms import Lam
+from potto.core.terms import Lam, Term
 from potto.diagnostics import PottoError
 from potto.integrate.costs import wanted
-from potto.kernels.cells import Cell, Value
+from potto.kernels.cells import Cell, Value, pad
 from potto.projects.settings import Settings
-from potto.python.arguments import LARGEST, LEAST, PATIENCE, Batch, with_axes, without_axes
-from potto.python.arrays import is_batch, shape_together
+from potto.python.arguments import LARGEST, LEAST, PATIENCE, Batch
+from potto.python.arrays import is_batch, is_one, shape_together, with_axes, without_axes
+from potto.python.following import followed
 from potto.runtime.answers.convergence import precise
 from potto.runtime.answers.estimate import Estimate
 from potto.runtime.evaluate import Clock, Program, bar, number, report, stats_of
@@ -36,6 +37,8 @@ from potto.runtime.integration.settled_calls import Batches, SettledCall, unused
 # What is not the same when the same is asked again.
 TIMES = {"seconds", "compile_seconds", "plan_seconds", "stats"}
 NUMBERS = float, int
+# Members of a batch without integrals that are done as one, if that takes no longer than so many seconds.
+MOST_AT_ONCE, AT_ONCE = 1 << 18, 0.1
 
 
 class Read(Struct, frozen=True, eq=False):
@@ -83,7 +86,7 @@ class PreparedCall(Struct, frozen=True, eq=False):
         same = settings is self.settings or settings == self.settings
         return same and len(args) == len(self.reads) and not _looked_at()
 
-    def estimate(self, number: Sequence[Any], error: Sequence[Any], **told: Any) -> Estimate:
+    def estimate(self, number: Sequence[Any], error: Sequence[Any], method: str, **told: Any) -> Estimate:
         """The estimate of a value and its tangents."""
         tangent: Any = None
         off: Any = None
@@ -93,7 +96,7 @@ class PreparedCall(Struct, frozen=True, eq=False):
             tangent, off = tuple(number[1:]), tuple(error[1:])
         if self.wrt and not self.dual:
             told["wrt"] = self.wrt
-        return self.made(number[0], error[0], tangent, off, method="quadrature", **told)
+        return self.made(number[0], error[0], tangent, off, method=method, **told)
 
 
 class AtOnce(PreparedCall, frozen=True, eq=False):
@@ -107,10 +110,10 @@ class AtOnce(PreparedCall, frozen=True, eq=False):
         start = time.perf_counter()
         if not self.asked(args, settings):
             return None
-        env, axes = self._env(args), 0
+        env, axes = self._env(args)
         if env is None:
             numbers, axes = without_axes(args)
-            env = self._env(numbers) if axes else None
+            env = self._env(numbers)[0] if axes else None
         found = None if env is None else self.settled.at(env)
         if found is None:
             return None
@@ -122,41 +125,62 @@ class AtOnce(PreparedCall, frozen=True, eq=False):
                 return None
         every: Any = None
         if axes:
-            number, error, every = with_axes(number, axes), with_axes(error, axes), with_axes((True,), axes)[0]
-        return self.estimate(number, error, evals=found.nodes, seconds=time.perf_counter() - start,
+            parts, every = with_axes((*number, *error), axes), with_axes((True,), axes)[0]
+            number, error = parts[: len(number)], parts[len(number) :]
+        return self.estimate(number, error, "quadrature", evals=found.nodes, seconds=time.perf_counter() - start,
                              stats=dict(self.stats), member_converged=every)  # fmt: skip
 
-    def _env(self, args: tuple[Any, ...]) -> dict[str, Cell] | None:
-        """The numbers as the integral takes them; None where one is of another kind than those of before."""
+    def _env(self, args: tuple[Any, ...]) -> tuple[dict[str, Cell] | None, int]:
+        """The numbers as the integral takes them, and how many axes they have; None where one is of another kind than
+        those of before."""
         env: dict[str, Cell] = {}
+        axes = 0
         for read, arg in zip(self.reads, args, strict=True):
             if arg.__class__ is float and read.kind == "number":  # as most are
                 env[read.name] = Cell(arg, None, read.t, read.et)
                 continue
+            if read.kind == "number" and is_one(arg):
+                axes, arg = max(axes, arg.ndim), arg.item()
             value = read.of(arg)
             if value is None:
-                return None
+                return None, 0
             env[read.name] = value
-        return env
+        return env, axes
+
+
+class Kernels(Struct, frozen=True, eq=False):
+    """A call that is no integral, nor computed of some, for numbers and batches of them."""
+
+    program: Program
+    body: Term
+    machine: Machine
+
+    def at(self, env: dict[str, Value]) -> tuple[Value | None, Machine]:
+        """The value with its tangents, None where it has two derivatives; and the machine that knows what was met.
+        Raises PottoError."""
+        machine = unused(self.machine)
+        value = self.program.value(machine, self.body, env)
+        return None if machine.record.edges else pad(value, machine.directions), machine
 
 
 class Together(PreparedCall, frozen=True, eq=False):
-    """What a call takes for a batch of numbers. most: members of one that is likely to be done soon."""
+    """What a call takes for a batch of numbers, or for some. most: members that are likely to be done soon."""
 
-    batches: Batches
+    batches: Batches | Kernels
+    least: int
     most: int
 
     def answer(self, args: tuple[Any, ...], settings: Settings) -> Estimate | None:
-        """As of `AtOnce`, for arrays that make a batch of several members that is not done in tiles."""
-        shape = shape_together(args)
-        if shape is None or not self.asked(args, settings):
+        """As of `AtOnce`, for arrays that make a batch that is not done in tiles, of several members where these are
+        integrals."""
+        batch = Batch(shape_together(args))
+        if not self.least <= batch.size <= self.most or not self.asked(args, settings):
             return None
-        batch = Batch(shape)
-        env = self._env(args, batch) if 1 < batch.size <= self.most else None
+        env = self._env(args, batch)
         if env is None:
             return None
         try:
-            with Clock() as clock:
+            with followed(), Clock() as clock:
                 value, machine = self.batches.at(env)
         except (PottoError, RecursionError):  # the general way says what is wrong, and where
             return None
@@ -164,14 +188,15 @@ class Together(PreparedCall, frozen=True, eq=False):
 
     def _told(self, cell: Cell, machine: Machine, clock: Clock, batch: Batch) -> Estimate:
         """The estimate of an integral; whether it is what was asked for needs no thought where each number is."""
-        record, parts = machine.record, list(zip((cell.v, *cell.t), (cell.e, *cell.et), strict=True))
+        record, sides = machine.record, ((cell.v, *cell.t), (cell.e, *cell.et))
+        parts = [(number(x), number(e)) for x, e in zip(*sides, strict=True)]
         plain = not (machine.events or record.edges or record.shortfalls)
         if plain and all(precise(x, e, self.settings.rtol) for x, e in parts):
             numbers, errors = ([batch.restored(x) for x in side] for side in zip(*parts, strict=True))
             return self.estimate(
-                numbers, errors, evals=record.evaluations, seconds=clock.seconds, compile_seconds=clock.spent,
-                plan_seconds=clock.planning, stats=stats_of(record, clock),
-                member_converged=batch.everybody,
+                numbers, errors, "+".join(sorted(record.methods)) or "exact", evals=record.evaluations,
+                seconds=clock.seconds, compile_seconds=clock.spent, plan_seconds=clock.planning,
+                stats=stats_of(record, clock), member_converged=None if batch.shape is None else batch.everybody,
             )  # fmt: skip
         found = report(cell, machine, clock)
         if not self.wrt:
@@ -185,9 +210,9 @@ class Together(PreparedCall, frozen=True, eq=False):
         env: dict[str, Value] = {}
         for read, arg in zip(self.reads, args, strict=True):
             if is_batch(arg):
-                if read.kind != "number" or arg.dtype.kind not in "fiu":
+                if batch.shape is None or read.kind != "number" or arg.dtype.kind not in "fiu":
                     return None
-                env[read.name] = Cell(batch.flat(arg.astype(float)), None, read.t, read.et)
+                env[read.name] = Cell(batch.row(arg), None, read.t, read.et)
                 continue
             value = read.of(arg)
             if value is None:
@@ -199,18 +224,23 @@ class Together(PreparedCall, frozen=True, eq=False):
 def together(
     program: Program, term: Lam, values: Sequence[Value], machine: Machine, found: Estimate, wrt: tuple[str, ...]
 ) -> Together | None:
-    """What a call over a batch takes that has just been answered; as of `at_once`."""
-    direct = program.shortest(term.body)
-    if not isinstance(direct, Direct) or _looked_at():
+    """What a call over a batch takes that has just been answered, or with numbers if it is no integral; as of
+    `at_once`."""
+    if _looked_at() or machine.taping or found.notes or (found.tangent is not None and not wrt):
         return None
     reads = [_read(name, None, value, False) for name, value in zip(term.params, values, strict=True)]
-    batches = direct.batches(unused(machine), dict(zip(term.params, values, strict=True)))
+    direct, size = program.shortest(term.body), getattr(found.value, "size", 1)
+    batches: Batches | Kernels | None = None
+    if isinstance(direct, Direct) and size > 1:
+        batches = direct.batches(unused(machine), dict(zip(term.params, values, strict=True)))
+    elif direct is None and (size > 1 or found.value.__class__ is float or is_one(found.value)):
+        batches = Kernels(program, term.body, machine)
     if batches is None or None in reads:
         return None
-    spent = max(found.seconds - found.compile_seconds, 1e-6)
-    most = min(LEAST - 1, max(found.value.size, int(found.value.size * PATIENCE / spent)))
+    soon, largest = (PATIENCE, LEAST - 1) if found.stats["integrals"] else (AT_ONCE, MOST_AT_ONCE)
+    most = min(largest, int(size * soon / max(found.seconds - found.compile_seconds, 1e-6)))
     known = tuple(read for read in reads if read is not None)
-    return Together(machine.settings, known, type(found), wrt, False, batches, most)
+    return Together(machine.settings, known, type(found), wrt, False, batches, 2 if direct else 1, most)
 
 
 def at_once(

@@ -75,15 +75,14 @@ class Call(Struct, frozen=True, eq=False):
         for a batch that which answered."""
         term, program, size = self.elaborated, self.world.program, getattr(found.value, "size", 1)
         if values and size and isinstance(term, Lam):  # an empty batch has nothing to go by
-            if size > 1:
-                many = None if machine is None else together(program, term, values, machine, found, wrt)
-                if many is not None:
-                    self.world.memory[self, wrt, BATCHES] = many
-                return
             machine = machine or program.machine(current(self.world.settings(self.file)))
-            known = at_once(program, term, tuple(args), values, machine, found, wrt)
+            known = at_once(program, term, tuple(args), values, machine, found, wrt) if size == 1 else None
             if known is not None:
                 self.world.memory[self, wrt] = known
+                return
+            many = together(program, term, values, machine, found, wrt)
+            if many is not None:
+                self.world.memory[self, wrt, BATCHES] = many
 
     def _gives_dual(self) -> bool:
         """Whether the answer is a dual; found out once for the present texts."""

@@ -18,7 +18,8 @@ from potto.kernels.errors import wrong_call
 from potto.kernels.sweeps import Swept, swept
 from potto.kernels.tape import Node, Untaped
 from potto.projects.settings import current
-from potto.python.arguments import LEAST, Batch, value_of, with_axes
+from potto.python.arguments import LEAST, Batch, value_of
+from potto.python.arrays import with_axes
 from potto.python.calls import Call
 from potto.python.derivative_forms import by_name, in_lists, must_match, weighted
 from potto.python.following import followed

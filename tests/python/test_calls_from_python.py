@@ -213,3 +213,46 @@ def test_functions_answers_and_errors_come_and_go_by_processes() -> None:
         with pytest.raises(potto.PottoError, match="Python str"):
             pool.submit(M.f, "a").result()
         assert pool.submit(getattr, M, "f").result()(0.5) == 0.5
+
+
+REPEATED = """
+def bend(x) abs(x - 0.5)^3 + x
+def corner(x) abs(x - 0.5)
+def pole(x) 0.3/x
+def whole(x, y) 2*x - y
+def by(shader, x) shader(x)^2
+def double(x) 2*x
+def choice(x) if x < 0.5 then x else integral [0, x] u d(u)
+def loop(x) sum i in 0..3 (x^i)
+"""
+GRID = np.linspace(0.0, 1.0, 12).reshape(3, 4)
+KINDS = {"number": 0.3, "one": np.array([[0.3]]), "grid": GRID, "floats": GRID.astype(np.float32),
+         "whole": np.arange(3), "gaps": GRID[:, ::2]}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("wrt", [None, "x"])
+def test_what_is_called_again_is_answered_as_the_first_time(kind: str, wrt: str | None) -> None:
+    """What calls of a kind go by is kept, not what they tell: at bends and poles, over other shapes before."""
+    x = KINDS[kind]
+    for name in ("bend", "corner", "pole", "whole", "choice", "loop"):
+        first, again = (
+            getattr(m, name) if wrt is None else potto.grad(getattr(m, name), wrt)
+            for m in (potto.compile(f"{REPEATED}# {n} {name} {kind} {wrt}") for n in range(2))
+        )
+        rest = (0.1,) if name == "whole" else ()
+        for other in (0.7, GRID, x):
+            again(other, *rest)
+        found, known = again(x, *rest), first(x, *rest)
+        for part in ("value", "error", "tangent", "tangent_error"):
+            np.testing.assert_array_equal(getattr(found, part), getattr(known, part), f"{name}: {part}")
+        assert np.array_equal(found.member_converged, known.member_converged) and found.method == known.method
+        assert (found.converged, found.reasons, len(found.notes)) == (known.converged, known.reasons, len(known.notes))
+        assert np.shape(found.value) == np.shape(x) and found.stats.keys() == known.stats.keys()
+
+
+def test_a_function_that_is_given_may_be_another_one_the_next_time() -> None:
+    m = potto.compile(REPEATED)
+    for shader in (m.double, m.loop, m.double, m.bend):
+        for x in (0.25, GRID, np.full(3, 0.25)):
+            np.testing.assert_array_equal(m.by(shader, x).value, shader(x).value ** 2)

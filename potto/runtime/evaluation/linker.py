@@ -42,6 +42,7 @@ class Linker:
         self.held = held if held is not None else {}
         self.terms: dict[tuple[str, str], Term] = {}
         self.exactness: dict[Term, bool] = {}
+        self._ready: dict[Term, Term] = {}
         self.reach = Reach(lambda name: self.term(name.module, name.name))
         self.alike: dict[Any, Any] = {}
         self.data: dict[Data, Value] = {}
@@ -65,8 +66,12 @@ class Linker:
         return term if self._named is None else self._named(term, self.terms)
 
     def ready(self, term: Term) -> Term:
-        """The term as it is evaluated: with branch cuts told, and numbers in the place of their names."""
-        return with_numbers(opened(term), self._number)
+        """The term as it is evaluated: with branch cuts told, and numbers in the place of their names; found out once,
+        where no names get values meanwhile."""
+        found = None if self.held else self._ready.get(term)
+        if found is None:
+            found = self._ready[term] = with_numbers(opened(term), self._number)
+        return found
 
     def _number(self, name: Global) -> Term | None:
         """The term of a definition that has no value yet; of a broken one nothing is said before it is needed."""
