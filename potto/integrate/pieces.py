@@ -1,6 +1,6 @@
 """What passes between the parts of the integrator: sums over a batch, pieces under refinement, environments.
 
-Owns `Sums`, `Shaped`, `Pieces` and `Evaluator`, the integrator's view of the machine.
+Owns `Sums`, `Shaped`, `Uncut`, `Pieces` and `Evaluator`, the integrator's view of the machine.
 """
 
 from __future__ import annotations
@@ -180,6 +180,15 @@ class Shaped(Struct, frozen=True):
     done: Bools
     short: Bools
     sums: Sums
+
+
+class Uncut(Struct, frozen=True):
+    """The sums of a batch, and the members whose boxes are not known to be uncut, or were left for another reason, with
+    sums of 0. precise: whether each number of all others is known to half of what is asked, as far as anyone looked."""
+
+    sums: Sums
+    rest: Ints
+    precise: bool = False
 
 
 class Pieces(Columns):

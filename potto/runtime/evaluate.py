@@ -222,7 +222,8 @@ def report(value: Value, machine: Machine, clock: Clock) -> Estimate:
         return answer(values, off, tangent, tangent_error, converged=not missing, shortfalls=missing)
     rtol, numbers = machine.settings.asked(_drawn(record)), told(value, lambda cell: cell.v)
     shown = _flat(numbers, told(value, lambda cell: cell.e))  # nan of nan is another reason than inf of nan
-    rough, slopes = rough_of(shown, rtol), rough_of(_slopes(value), rtol)
+    precise = None if _drawn(record) else record.precise
+    rough, slopes = rough_of(shown, rtol, precise), rough_of(_slopes(value), rtol, precise)
     error_of = bar if any(each.unknown for each in (*rough, *slopes)) else number
     bounds = told(value, lambda cell: error_of(cell.e))
     tangents = tangent_bounds = None

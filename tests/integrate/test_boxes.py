@@ -11,6 +11,7 @@ import pytest
 import potto
 from potto.integrate.fixed.lowered.boxes import LoweredBoxes, Passed
 from potto.kernels.native import objects
+from potto.runtime.answers import convergence
 from potto.runtime.integration.methods import quadrature
 
 needs_llvm = pytest.mark.skipif(not objects.available(), reason="llvmlite is not installed")
@@ -179,3 +180,31 @@ def corner(a, b) integral ([a, a + 1/16], [b, b + 1/16]) 1e10*exp(-1e5*(x + y)) 
     ):
         assert (np.abs(found.value - exact) <= found.error + 1e-15).all()
         assert found.converged and found.error.max() <= 1e-10
+
+
+@pytest.mark.parametrize("spoilt", [(), (7, 50)])
+@pytest.mark.parametrize("edge", [50.0, 3.9])
+def test_numbers_that_machine_code_knows_to_be_precise_are_not_asked_again(
+    spoilt: tuple[int, ...], edge: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """But for members that are cut; and where one is less so, as sin(x + 1e10) is off by the rounding of its argument,
+    all are."""
+    pytest.importorskip("llvmlite")
+    text = "def f(px, k, c) integral ([px, px + 1], [0, 1]) sin(x + k)*[x + y < c] d(x, y)"
+    asked, looked = list[int](), convergence.rough_places
+
+    def counted(numbers: Any, errors: Any, rtol: float) -> Any:
+        asked.append(np.size(numbers))
+        return looked(numbers, errors, rtol)
+
+    monkeypatch.setattr(convergence, "rough_places", counted)
+    px, k = np.linspace(0, 2, 300), np.full(300, 0.3)
+    k[list(spoilt)] = 1e10
+    with potto.settings(backend="native"):
+        answer = potto.grad(potto.compile(text).f, "c")(px, k, edge)
+    assert np.flatnonzero(~answer.member_converged).tolist() == list(spoilt)
+    assert (300 in asked) == bool(spoilt)
+    x = px[px + 2 <= edge]
+    exact = np.cos(x + 0.3) - np.cos(x + 1.3)
+    off = np.abs(answer.value[: x.size] - exact) > answer.error[: x.size] + 1e-15
+    assert set(np.flatnonzero(off)) <= set(spoilt)

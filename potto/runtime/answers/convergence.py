@@ -1,8 +1,8 @@
 """Whether an answer is as accurate as was asked for; and if not, why, member by member.
 
-Owns `Shortfalls`, `Rough`, `missed`, `missing`, `precise` and `rounded`. Converged means: the error is within
-`rtol * |value|`, or within `atol`. An answer that is 0 because its parts cancel has no digits that could be relative to
-it: what its error may be then, `allowances` says.
+Owns `Shortfalls`, `Rough`, `Precise`, `missed`, `missing`, `precise` and `rounded`. Converged means: the error is
+within `rtol * |value|`, or within `atol`. An answer that is 0 because its parts cancel has no digits that could be
+relative to it: what its error may be then, `allowances` says.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from potto.integrate.events import (
 )
 from potto.integrate.pieces import Sums, added_up, together
 from potto.integrate.precision import imprecise, rough_places
-from potto.kernels.cells import Array, Bools, Ints, Number, Value
+from potto.kernels.cells import Array, Bools, Cell, Ints, Number, Value
 from potto.projects.settings import Settings
 from potto.runtime.answers.allowances import Allowed, allowance
 
@@ -116,13 +116,39 @@ class Rough(Struct, frozen=True):
         return found
 
 
-def rough_of(pairs: Iterable[tuple[Number, Number]], rtol: float) -> list[Rough]:
+class Precise(Struct, frozen=True):
+    """Sums of a batch whose numbers are known to be precise but for those of some members, as who found them has told:
+    large arrays take as long to be looked at again as to be made. pairs: these numbers with their errors, as they are
+    in an answer."""
+
+    sums: Sums
+    rest: Ints
+    pairs: tuple[tuple[Number, Number], ...] = ()
+
+    def shown(self, sums: Sums, cells: Iterable[Cell]) -> Precise | None:
+        """The same of the numbers that these sums are in an answer; None if they are not those that it is known of."""
+        if sums is not self.sums:
+            return None
+        found = (pair for cell in cells for pair in ((cell.v, cell.e), *zip(cell.t, cell.et, strict=True)))
+        return Precise(sums, self.rest, tuple(found))  # type: ignore[arg-type]
+
+    def places(self, number: Number, error: Number, rtol: float) -> list[Ints] | None:
+        """Where a number of these is not precise; None if it is another one."""
+        if not any(number is own and error is off for own, off in self.pairs):
+            return None
+        some, off = (np.reshape(part, -1).take(self.rest) for part in (number, error))
+        return [self.rest[found] for found in rough_places(some, off, rtol)]
+
+
+def rough_of(pairs: Iterable[tuple[Number, Number]], rtol: float, known: Precise | None = None) -> list[Rough]:
     """Of numbers with their errors those that are not precise."""
     found = []
     for number, error in pairs:
         if number.__class__ is float and precise(number, error, rtol):  # numpy takes its time over a single number
             continue
-        places = list(rough_places(number, error, rtol))
+        places = None if known is None else known.places(number, error, rtol)
+        if places is None:
+            places = list(rough_places(number, error, rtol))
         if places:
             found.append(Rough(number, error, np.concatenate(places)))
     return found

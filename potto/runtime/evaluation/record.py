@@ -20,7 +20,7 @@ from potto.integrate.events import Events, OneSidedDerivatives, Shortfall, TwoSi
 from potto.kernels.cells import Array, Value
 from potto.kernels.tape import Node
 from potto.runtime.answers.allowances import NOTHING, Allowed
-from potto.runtime.answers.convergence import Shortfalls, merged
+from potto.runtime.answers.convergence import Precise, Shortfalls, merged
 from potto.runtime.evaluation.gauge import Gauge, begun
 
 # A box takes as long as 1 to 5 evaluations. Of the catalogue's regions in three variables one takes 157,000 boxes, the
@@ -40,6 +40,7 @@ class Record(Struct):
     culled: integrals that are 0 for certain, and were not evaluated. seen: such as were answered without a plan.
     cells: on how many stretches roots have been looked for; each counts as an evaluation where a budget is asked.
     isolated: the roots that were found.
+    precise: the last batch of which it is known that most of its numbers are precise.
     fresh: whether the arrays of what was found are in nobody else's hands.
     start, members: how much had been done before what counts, and for how many members this is.
     boxes, most_boxes: in how many boxes places have been searched for, and in how many they may be for each member.
@@ -54,6 +55,7 @@ class Record(Struct):
     methods: set[str] = set()
     second: bool = False
     allowed: Allowed = NOTHING
+    precise: Precise | None = None
     fresh: bool = False
     start: int = 0
     members: int = 1

@@ -20,7 +20,7 @@ from potto.diagnostics import PottoError
 from potto.integrate.events import BUDGET_SPENT
 from potto.integrate.pieces import INTO, OF, Sums, gather, still
 from potto.kernels import errors
-from potto.kernels.cells import Cell, Ints, Value, batch_shape, map_arrays, pad
+from potto.kernels.cells import Cell, Ints, Value, all_cells, batch_shape, map_arrays, pad
 from potto.kernels.making import making
 from potto.runtime.answers.allowances import left_by
 from potto.runtime.evaluation.functions import Chosen, choices, settled
@@ -147,7 +147,10 @@ def _integrate(machine: Machine, term: Integral, env: dict[str, Value], outermos
         return _shaped(sums, shape)
     record.tell(problem.events, batch, shape)
     record.allowed = record.allowed.and_of(left_by(term, sums, machine.rtol, shape))
-    return _shaped(sums, shape)
+    value = _shaped(sums, shape)
+    if record.precise is not None:
+        record.precise = record.precise.shown(sums, all_cells(value))
+    return value
 
 
 def _grouped(problem: Problem, flat: dict[str, Value]) -> Sums:

@@ -21,15 +21,15 @@ from potto.integrate.fixed.boxes.tensor_product import ORDERS, BoxIntegrand, int
 from potto.integrate.fixed.lowered.box_text import Look
 from potto.integrate.fixed.lowered.boxes import LoweredBoxes, Passed
 from potto.integrate.fixed.lowered.cells import places_of
-from potto.integrate.pieces import Evaluator, Sums, gather
+from potto.integrate.pieces import Evaluator, Sums, Uncut, gather
 from potto.kernels.cells import Cell, Ints, Value
 
 # On how many surfaces sides may depend, and how many integrands there may be, for machine code that decides by itself.
 MOST_SIDES, MOST_FACES = 4, 4
 
 
-def uncut(box: Box, machine: Evaluator, env: dict[str, Value], batch: int) -> tuple[Sums, Ints] | None:
-    """The sums of a batch, and the members that were not integrated here, whose sums are 0; None if none were."""
+def uncut(box: Box, machine: Evaluator, env: dict[str, Value], batch: int) -> Uncut | None:
+    """What can be integrated of a batch; None if that is nothing."""
     able = machine.backend != "numpy" and all(isinstance(env.get(name), Cell) for name in box.names)
     ways = _deciding(box, machine, env) if able else ()
     passed = _passed(ways, machine, env, batch)
@@ -44,7 +44,7 @@ def uncut(box: Box, machine: Evaluator, env: dict[str, Value], batch: int) -> tu
 
 def _by_faces(
     box: Box, machine: Evaluator, env: dict[str, Value], batch: int, able: bool
-) -> tuple[Sums, Ints] | None:  # fmt: skip
+) -> Uncut | None:  # fmt: skip
     """The same by sides that numpy finds; able: whether machine code may integrate."""
     sides = sides_of(box, machine, env, batch)
     if sides is None:
@@ -66,7 +66,7 @@ def _by_faces(
             sums.put(where, found)
     if not done.any():
         return None
-    return Sums.zeros(1, machine.directions, batch) if sums is None else sums, np.nonzero(~done)[0]
+    return Uncut(Sums.zeros(1, machine.directions, batch) if sums is None else sums, np.nonzero(~done)[0])
 
 
 def _of_face(
@@ -139,7 +139,7 @@ def _passed(ways: Sequence[LoweredBoxes], machine: Evaluator, env: dict[str, Val
             index = passed.left
             again = way.run(function, machine, gather(env, index), index.size)
             passed.sums.put(index, again.sums)
-            passed.left = index[again.left]
+            passed.left, passed.precise = index[again.left], passed.precise and again.precise
         if not passed.left.size:
             break
     return passed
@@ -147,16 +147,16 @@ def _passed(ways: Sequence[LoweredBoxes], machine: Evaluator, env: dict[str, Val
 
 def _with_left(
     box: Box, passed: Passed, machine: Evaluator, env: dict[str, Value], batch: int
-) -> tuple[Sums, Ints] | None:  # fmt: skip
+) -> Uncut | None:  # fmt: skip
     """What functions have made of a batch, and what numpy makes of what they left."""
-    sums, left = passed.sums, passed.left
+    sums, left, precise = passed.sums, passed.left, passed.precise
     if left.size:
         found = _by_faces(box, machine, gather(env, left), left.size, False)
         if found is not None:
-            sums = sums.with_members(left, found[0])
-            left = left[found[1]]
+            sums, precise = sums.with_members(left, found.sums), False
+            left = left[found.rest]
     rest = np.sort(np.concatenate((passed.crossed, left)))
-    return (sums, rest) if rest.size < batch else None
+    return Uncut(sums, rest, precise) if rest.size < batch else None
 
 
 def _rented(ways: Sequence[LoweredBoxes]) -> AbstractContextManager[None]:

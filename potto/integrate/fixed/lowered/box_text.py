@@ -29,11 +29,12 @@ NEAR = 1e-9
 SLOWING = 8
 
 
-# What became of a member: a surface may cross it, nothing is there to be integrated, it is done, or left to others.
-CROSSED, DARK, DONE, LEFT = range(4)
-# Behind the columns the frame tells how many members are done, crossed and left; where lists of the last two are; then
-# where the rows of results are.
-COUNTS, LISTS, ROWS = 0, 3, 5
+# What became of a member: a surface may cross it, nothing is there to be integrated, it is done (and known to half of
+# what is asked of each of its numbers, or less so), or left to others.
+CROSSED, DARK, DONE, ROUGH, LEFT = range(5)
+# Behind the columns the frame tells how many members are done, crossed, left, and done less accurately; where lists of
+# the crossed and the left are; then where the rows of results are.
+COUNTS, LISTS, ROWS = 0, 4, 6
 
 
 class Look(Struct, frozen=True):
@@ -112,10 +113,11 @@ class BoxText(BoxMeans):
         """Count the members of a block that are done, and put the others on lists."""
         at, state, own = self.at, self.at.load(self.state), self.owners()
         fresh = at.apply("ge", own, self.spread(self.number))
-        done, *others = (at.apply("and", fresh, at.apply("eq", state, at.number(float(code))))
-                         for code in (DONE, CROSSED, LEFT))  # fmt: skip
-        count = at.at("%frame", self.tail + COUNTS, "i64")
-        at.line(f"store i64 {at.whole('add', at.let(f'load i64, ptr {count}'), at.many(done))}, ptr {count}")
+        done, rough, *others = (at.apply("and", fresh, at.apply("eq", state, at.number(float(code))))
+                                for code in (DONE, ROUGH, CROSSED, LEFT))  # fmt: skip
+        for slot, mask in ((0, at.apply("or", done, rough)), (3, rough)):
+            count = at.at("%frame", self.tail + COUNTS + slot, "i64")
+            at.line(f"store i64 {at.whole('add', at.let(f'load i64, ptr {count}'), at.many(mask))}, ptr {count}")
         for number, mask in enumerate(others):
             place = at.address("%frame", self.tail + LISTS + number, "ptr")
             self.append(mask, [own], [place], at.at("%frame", self.tail + COUNTS + 1 + number, "i64"))
@@ -214,7 +216,7 @@ class BoxText(BoxMeans):
             for a, b, size in zip(self.low, self.high, self.sizes, strict=True)
         ]  # fmt: skip
         rtol, least = at.constant("%constants", 0), at.apply("div", at.constant("%constants", 1), volume)
-        bounds, good = [], None
+        bounds, good, precise = [], None, mask
         for c, mean in enumerate(means):
             error, floor = self.zero, self.own_rounding(c, shares[c // k1])
             for i, n in enumerate(self.orders):
@@ -228,7 +230,10 @@ class BoxText(BoxMeans):
             asked = self.larger(at.apply("mul", rtol, at.apply("abs", mean)), least)
             fine = at.apply("le", error, self.larger(asked, at.apply("mul", at.number(8.0), floor)))
             good = fine if good is None else at.apply("and", good, fine)
-            bounds.append(at.apply("add", error, floor))
+            bound, size = at.apply("add", error, floor), at.apply("abs", mean)
+            precise = self.all([precise, at.apply("le", bound, at.apply("mul", rtol, size)),
+                                at.apply("lt", at.apply("mul", size, volume), at.number(float("inf")))])  # fmt: skip
+            bounds.append(bound)
         assert good is not None
         for peak, room in zip(self.peaks, self.largest, strict=True):
             seen = at.apply("mul", at.number(PEAK), at.load(room))
@@ -245,7 +250,8 @@ class BoxText(BoxMeans):
         done = at.apply("and", mask, good)
         for number, value in enumerate(rows):
             self.keep(done, at.apply("mul", value, volume), self.place(number))
-        state = at.apply("select", good, at.number(float(DONE)), at.number(float(LEFT)))
+        state = at.apply("select", precise, at.number(float(DONE)), at.number(float(ROUGH)))
+        state = at.apply("select", good, state, at.number(float(LEFT)))
         self.keep(mask, state, self.state)
 
     def own_rounding(self, c: int, share: str | None) -> str:

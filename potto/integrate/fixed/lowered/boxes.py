@@ -14,7 +14,7 @@ import numpy as np
 from msgspec import Struct, field
 
 from potto.integrate.fixed.axes import axis
-from potto.integrate.fixed.lowered.box_text import COUNTS, BoxText, Look, numbers
+from potto.integrate.fixed.lowered.box_text import LISTS, BoxText, Look, numbers
 from potto.integrate.fixed.lowered.cells import frame_of, given, parts, whole
 from potto.integrate.fixed.lowered.formula_text import ParameterPlace
 from potto.integrate.fixed.lowered.rule_text import NAME
@@ -34,11 +34,13 @@ WORD = 8  # bytes
 
 class Passed(Struct):
     """What a function made of members: their sums, 0 for those that are not done; those that a surface may cross; and
-    those that nothing crosses, as far as is known, and that are not done."""
+    those that nothing crosses, as far as is known, and that are not done. precise: whether all that are done are known
+    to half of what is asked of each of their numbers."""
 
     sums: Sums
     crossed: Ints
     left: Ints
+    precise: bool
 
 
 class LoweredBoxes(Struct, frozen=True):
@@ -68,17 +70,17 @@ class LoweredBoxes(Struct, frozen=True):
         sums, rows = _sums_of(m, machine.directions, least)
         columns, lists = [whole(column, least) for column in arrays], np.empty((2, AT_ONCE + 3 * LANES), dtype=np.int64)
         head = frame_of(rows[0][None], axes, [])
-        tail = head.size + len(columns) + COUNTS
-        frame = np.array([*head, *map(address, columns), 0, 0, 0, *map(address, (*lists, *rows))], dtype=np.int64)
+        tail = head.size + len(columns)
+        frame = np.array([*head, *map(address, columns), *[0] * LISTS, *map(address, (*lists, *rows))], dtype=np.int64)
         steps = np.zeros_like(frame)  # of where things are, from member to member
         steps[head.size : tail] = steps[frame.size - len(rows) :] = WORD
-        done, found = 0, ([np.zeros(0, dtype=np.int64)], [np.zeros(0, dtype=np.int64)])
+        done, rough, found = 0, 0, ([np.zeros(0, dtype=np.int64)], [np.zeros(0, dtype=np.int64)])
         for start, stop in parts(least, AT_ONCE):
             here = frame + steps * start
             here[0] = stop - start
             function.call(address(here), address(constants))
-            own, *others = here[tail : tail + 3].tolist()
-            done += own
+            own, *others, less = here[tail : tail + LISTS].tolist()
+            done, rough = done + own, rough + less
             for known, members, count in zip(found, lists, others, strict=True):
                 known.append(members[:count] + start)
         machine.count(done * math.prod(self.orders))
@@ -86,7 +88,7 @@ class LoweredBoxes(Struct, frozen=True):
         crossed, left = (np.concatenate(known) for known in found)
         if batch < least:
             sums, crossed, left = sums.pick(slice(batch)), crossed[crossed < batch], left[left < batch]
-        return Passed(sums, crossed, left)
+        return Passed(sums, crossed, left, not rough)
 
 
 def _sums_of(m: int, k: int, batch: int) -> tuple[Sums, list[Array]]:

@@ -20,7 +20,7 @@ from potto.integrate.events import Along, Degenerate, Events, Shortfall, Surface
 from potto.integrate.pieces import Sums
 from potto.kernels.cells import Array, Bools, Ints
 from potto.kernels.memory import kept
-from potto.runtime.answers.convergence import missing, rounded
+from potto.runtime.answers.convergence import Precise, missing, rounded
 from potto.runtime.integration.methods.attempts import proved_beforehand
 from potto.runtime.integration.methods.choices import orders, preferred
 from potto.runtime.integration.methods.directions import by_directions
@@ -37,6 +37,8 @@ MOST_UNKNOWN = 64
 # Up to which part of a batch is left as rules have it where rounding spoils them all: one member by itself takes as
 # long as ten thousand, for an error that is 0.2 to 0.7 of what it was.
 RARE = 1e-3
+# Up to which part of a batch others are looked at by themselves, beside those that are known to be precise.
+OTHERS = 0.125
 # For how many members without the accuracy asked for it is tried what can be done for one.
 MOST_ROUGH = 256
 NOBODY: Ints = np.zeros(0, dtype=np.int64)
@@ -82,11 +84,13 @@ def by_members(problem: Problem, settled: Settled) -> Sums:
     boxes = whole_boxes(plan, problem.machine, problem.env, problem.batch)
     if boxes is None:
         return _cut(problem, settled)
-    sums, rest = boxes
+    sums, rest = boxes.sums, boxes.rest
     if rest.size:
         with problem.among(rest) as part:
             sums = sums.with_members(rest, _cut(part, settled))
         problem.events.take(part.events, rest)
+    if boxes.precise and rest.size < OTHERS * problem.batch:
+        problem.machine.record.precise = Precise(sums, rest)
     return sums
 
 

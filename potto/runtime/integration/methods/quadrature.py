@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from potto.integrate.pieces import Shaped, Sums, gather, still
+from potto.integrate.pieces import Shaped, Sums, Uncut, gather, still
 from potto.integrate.plan import Plan
 from potto.kernels.cells import Bools, Ints, Value
 from potto.runtime.answers.convergence import rounded
@@ -33,7 +33,7 @@ def in_parts(plan: Plan, machine: Machine, env: dict[str, Value], batch: int) ->
     found = whole_boxes(plan, machine, env, batch)
     if found is None:
         return cut_up(plan, machine, env, batch)[0]
-    sums, rest = found
+    sums, rest = found.sums, found.rest
     if rest.size:
         apart = machine.apart()
         sums = sums.with_members(rest, cut_up(plan, apart, gather(env, rest), rest.size)[0])
@@ -41,7 +41,7 @@ def in_parts(plan: Plan, machine: Machine, env: dict[str, Value], batch: int) ->
     return sums
 
 
-def whole_boxes(plan: Plan, machine: Machine, env: dict[str, Value], batch: int) -> tuple[Sums, Ints] | None:
+def whole_boxes(plan: Plan, machine: Machine, env: dict[str, Value], batch: int) -> Uncut | None:
     """The sums of a batch whose boxes nothing cuts, and the members that are left; None where it is not worth a look,
     or nothing came of it."""
     if batch < FEW or plan.box is None:
@@ -51,7 +51,7 @@ def whole_boxes(plan: Plan, machine: Machine, env: dict[str, Value], batch: int)
     with one_thread():
         found = uncut(plan.box, machine, env, batch)
     if found is not None and machine.costs is not None:
-        machine.costs.whole += batch - found[1].size
+        machine.costs.whole += batch - found.rest.size
         machine.costs.looked += batch
     return found
 
