@@ -121,3 +121,15 @@ def test_tails_that_rise_beyond_the_last_node_of_a_long_panel_are_counted() -> N
     x = (np.arange(400)[:, None] + (u + 1) / 2) / 400
     values = 3 + np.sin(2 * x) - 2 * np.exp(-(((x - 0.8084) / 0.107) ** 4)) / (1 + ((x - 0.7548) / 0.0164) ** 4)
     assert abs(peak.value - (values @ w).sum() / 800) <= peak.error <= 1e-8
+
+
+@pytest.mark.parametrize("power", [228_600.0, 3.1e7])
+def test_rounding_of_a_power_by_which_it_is_differentiated_is_in_the_bar(power: float) -> None:
+    """A base rounded to 1e-16 leaves 1e-16 of the power, which is all within an eightieth of what is cut out for it."""
+    f = potto.compile("def f(n, t) integral [0, 1] x + (1/(1 + (x - t)^2))^n d(x)").f
+    found = potto.deriv(f)((power, 1.0), (0.5891, 0.0))
+    with mp.workdps(30):
+        n = mp.mpf(power)
+        area = mp.sqrt(mp.pi) * mp.gammaprod([n - 0.5], [n])
+        assert abs(found.value - 0.5 - area) <= found.error
+        assert abs(found.tangent - area * (mp.digamma(n - 0.5) - mp.digamma(n))) <= found.tangent_error

@@ -19,6 +19,7 @@ from potto.integrate.levels import LevelPlan
 from potto.integrate.panels.iterated import Iterated
 from potto.integrate.panels.mending import mend
 from potto.integrate.panels.roundoff import (
+    ASIDE,
     LOOKED_AT,
     WITHIN,
     coarse,
@@ -30,6 +31,7 @@ from potto.integrate.panels.roundoff import (
     shake,
     share,
     together,
+    worst_part,
 )
 from potto.integrate.pieces import Crossing, Ends, Evaluator, Pieces, Sums, all_of, column, dense, gather, still, take
 from potto.integrate.rules import substitution
@@ -326,8 +328,8 @@ class PanelBatch(Struct, dict=True):
             index = np.flatnonzero(np.isin(seg.kind, (kind, substitution.BOTH)))
             if index.size:
                 place = np.full((index.size, 1), u)
-                near, off = self.seen(index, place)
-                inside, _ = self.seen(index, np.full((index.size, 1), 0.5))
+                near, off = (each[..., 0] for each in self.seen(index, place))
+                inside = self.seen(index, np.full((index.size, 1), 0.5))[0][..., 0]
                 part = np.where(near > STEEP * inside, part_of(near, off), 0.0).max(axis=0)
                 x, _, _ = substitution.points(seg.pick(index), place)
                 found[row, index] = (
@@ -352,11 +354,10 @@ class PanelBatch(Struct, dict=True):
 
     def share_within(self, index: Ints) -> Array:
         """Which part of F its rounding is within segments: (m, I)."""
-        return part_of(*self.seen(index, np.tile(WITHIN, (index.size, 1))))
+        return worst_part(*self.seen(index, np.tile((*WITHIN, *ASIDE), (index.size, 1))))
 
     def seen(self, index: Ints, u: Array) -> tuple[Array, Array]:
-        """The size of F, and its rounding, at places u (I, n) of segments together, which are not counted as
-        evaluations: (m, I) each."""
+        """The size of F, and its rounding, at places u (I, n) of segments, not counted as evaluations: (m, I, n)."""
         x, _, _ = substitution.points(self.seg.pick(index), u)
         rows = np.repeat(index, u.shape[1])
         sides = take(self.sides, rows)
@@ -365,7 +366,7 @@ class PanelBatch(Struct, dict=True):
             self.parent.body(here, sides, self.machine.with_directions(0).tracking()), 0, rows.shape
         )
         off = np.zeros(numbers.shape) if errors is None else np.where(np.isfinite(errors), errors, 0.0)
-        size, lost = (np.abs(row[:, 0]).reshape(-1, *x.shape).sum(axis=-1) for row in (numbers, off))
+        size, lost = (np.abs(row[:, 0]).reshape(-1, *x.shape) for row in (numbers, off))
         return size, lost
 
     def still_at(self, x: Array, owner: Ints, sides: dict[int, Mask]) -> tuple[Array, Array]:

@@ -1,7 +1,8 @@
 """What rounding does to the integral over a piece.
 
-Owns `shake`, `few_doubles` and `coarse` (of nodes), `share`, `part_of` and `noise` (of the integrand), `misplaced`,
-`note_ends` and `hidden_steps` (of the ends of segments) and `together` (of derivatives that move with the nodes).
+Owns `shake`, `few_doubles` and `coarse` (of nodes), `share`, `part_of`, `worst_part` and `noise` (of the integrand),
+`misplaced`, `note_ends` and `hidden_steps` (of the ends of segments) and `together` (of derivatives that move with the
+nodes).
 """
 
 from __future__ import annotations
@@ -24,8 +25,9 @@ COARSE, MANY = 1e-6, 0.25
 # which on that is a jump, which is looked for where cuts move in different ways (`degenerate.degeneracies`).
 SMOOTH, STEP = 1e-13, 1e-6
 # Places within a range, as parts of it, that tell the rounding of an integrand: there not all is 0, or stands still, by
-# symmetry.
+# symmetry; and others beside its ends: all that what is cut out as a layer does it does within an eightieth of it.
 WITHIN = np.array((0.309, 0.618))
+ASIDE = np.array((0.012, 0.988))
 LOOKED_AT = 64  # how many ranges are looked at within, if there are more
 
 
@@ -65,6 +67,12 @@ def share(f: Array, e: Array) -> Array:
 def part_of(size: Array, off: Array) -> Array:
     """The same of numbers added up at places, and 0 where their errors are."""
     return np.where(off > 0, share(size, off), 0.0)
+
+
+def worst_part(size: Array, off: Array) -> Array:
+    """The larger part of numbers (..., 4) at WITHIN and ASIDE, two by two, that their errors are."""
+    within, aside = (part_of(size[..., two].sum(axis=-1), off[..., two].sum(axis=-1)) for two in ([0, 1], [2, 3]))
+    return np.maximum(within, aside)
 
 
 def noise(ends: Ends, width: int, p: Pieces, seg: Segments) -> Array:
