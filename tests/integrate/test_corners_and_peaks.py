@@ -148,3 +148,14 @@ def test_what_is_narrow_where_a_divisor_is_small(k: float, t: float) -> None:
         exact = 1 + mp.fsum(mp.atan(k * u) / (2 * k) + u / (2 * (1 + (k * u) ** 2)) for u in ends)
         assert abs(found.value - exact) <= found.error + 1e-15
     assert found.error <= 1e-10
+
+
+@pytest.mark.slow
+def test_a_steep_turn_along_a_circle() -> None:
+    """Over x a root of the distance from sqrt(t), but for a stretch of 1e-5: a piece graded towards it looks smooth in
+    one form of the derivative alone. The exact ones by the area of discs within the square, by mpmath."""
+    f = potto.deriv(potto.compile(
+        "def f(t) integral ([0, 1], [0, 1]) atan2(2e4*(x^2 + y^2 - t), 1) d(x, y)").f)  # fmt: skip
+    answer = f((0.5, 1.0))
+    assert abs(answer.value - 1.3483236115858564403 / 4) <= answer.error + 2e-16 <= 1e-9
+    assert abs(answer.tangent + 9.8690639924038129418 / 4) <= answer.tangent_error + 1e-15 <= 1e-8

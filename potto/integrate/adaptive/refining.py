@@ -11,6 +11,7 @@ of the batch in one go. For a derivative two forms are computed from the same va
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -186,7 +187,8 @@ def measured(work: PanelBatch, new: Pieces, order: int) -> Pieces:
     """Pieces of segments, measured; those that are graded once more, with more nodes, or as they are: which they stay
     where they are smooth so, or nodes that crowd lie where rounding leaves less than more nodes would miss."""
     new = work.measure(new, order)
-    promising = (new.error <= PROMISING * by_either_form(work, new.size)).all(axis=0)
+    either = by_either_form(work, new.error, np.minimum)  # the better form is the one that is believed
+    promising = (either <= PROMISING * by_either_form(work, new.size)).all(axis=0)
     if (graded := np.nonzero((new.end != 0) & promising)[0]).size:
         new.held_against(work.measure(new.places(graded), order + MORE), graded)
     turning = work.seg.turning[new.segment]
@@ -203,13 +205,13 @@ def measured(work: PanelBatch, new: Pieces, order: int) -> Pieces:
     return new
 
 
-def by_either_form(work: PanelBatch, size: Array) -> Array:
+def by_either_form(work: PanelBatch, size: Array, which: Callable[[Array, Array], Array] = np.maximum) -> Array:
     """What errors of pieces are measured by, (C, P): of a derivative the larger of its two forms. What moves with its
     ends leaves nothing of the one but rounding, of which no digit is right."""
     if not work.both:
         return size
     rows = size.reshape(work.width, -1, size.shape[-1])
-    larger = np.maximum(rows[:, 1 : 1 + work.k], rows[:, 1 + work.k :])
+    larger = which(rows[:, 1 : 1 + work.k], rows[:, 1 + work.k :])
     return np.concatenate((rows[:, :1], larger, larger), axis=1).reshape(size.shape)
 
 
