@@ -221,7 +221,8 @@ NO_SAMPLE = Shortfall(
     "sample more (`--samples`), or integrate by `--method quadrature`",
 )
 NO_SECOND_DERIVATIVE = Shortfall(
-    "no second derivative is known here: two surfaces coincide, or one passes through a corner", BESIDE
+    "no second derivative is known here: a surface lies on a bound or on another one, or passes through a corner",
+    BESIDE,
 )
 DISAGREE = Shortfall("the second derivative is not known: its formula and numbers disagree about the first one")
 

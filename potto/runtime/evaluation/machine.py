@@ -349,7 +349,7 @@ class Machine:
         if self.root and self.directions and self.record.second and not self.aside and np.any(surface == 0):
             raise errors.Coincidence([PRODUCT_OF_DELTAS(
                 errors.NOWHERE, NO_SECOND_DERIVATIVE.message,
-                notes=("where both jump, it holds a product of deltas on the same surface, and does not exist",),
+                notes=("a bound jumps, too: of two at one place it holds a product of deltas, which does not exist",),
                 help="move the parameters apart, or differentiate only once",
             )])  # fmt: skip
         if surface.__class__ is float:
