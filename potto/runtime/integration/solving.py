@@ -59,6 +59,8 @@ from potto.runtime.integration.problem import Problem
 # there is: a torus takes 2.8 times as many evaluations, and tables of it 8 times. How uncertain a trial may leave an
 # answer for that to be done at once: of a torus 1e-3 in the order to take and 0.3 in the others, of an arm 1e-10.
 LONGER, PROMISING = 4, 1e-2
+# From how many evaluations that there are those are left that tables may take for nothing, 3 million.
+PLENTY = 10_000_000
 # Evaluations for rules in four variables where samples are to be drawn: of 12 polytopes of random planes rules ended
 # with 2 to 4 planes (2,000 to 220,000 evaluations), and with the 12 of all differences (58,000), to all digits.
 # Where they did not it took as long as the samples, with 12 planes 4 s.
@@ -152,8 +154,8 @@ def along_cuts(problem: Problem) -> Sums:
     most = trial(problem)
     stopped: list[Attempt] = []
     tables: list[Attempt] | None = None
-    if most is not None and endless(problem):  # of infinite ranges iteration takes long in every order
-        tables = by_tables(problem)
+    if most is not None and endless(problem) and machine.settings.max_evals >= PLENTY:
+        tables = by_tables(problem)  # of infinite ranges iteration takes long in every order
     if tables and accurate(tables[0].sums, machine.rtol, machine):
         return tables[0].sums
     for order, allowed, at_once in tried(problem, most):
