@@ -83,6 +83,7 @@ def test_what_is_narrow_beside_its_range_is_integrated(length: float) -> None:
         ("integral [-L, L] [x < 0.3]*exp(-x^2) d(x)", math.sqrt(math.pi) * (1 + math.erf(0.3)) / 2),
         ("integral [-L, L] [x < 3]*exp(-abs(x)) d(x)", 2 - math.exp(-3)),
         ("integral ([-L, L], [-L, L]) exp(-x^2 - y^2) d(x, y)", math.pi),
+        ("integral [-L, L] (sum k in 1..2 (1/(1 + (k*x)^2)^2)) d(x)", 3 * math.pi / 4),
     ],
 )
 def test_densities_over_long_ranges(text: str, exact: float, length: float) -> None:

@@ -20,8 +20,8 @@ SIZES = 2.0 ** np.arange(6, 1024, 12)
 
 
 def shells(lo: Cell, hi: Cell, rows: Sequence[Row], batch: int) -> list[Row]:
-    """Rows around both bounds and the places of other rows, of long finite ranges; those outside of a range are none of
-    it."""
+    """Rows around both bounds, around 0, where numbers are dense, and around the places of other rows, of long finite
+    ranges; those outside of a range are none of it."""
     low, high = as_array(lo.v, batch), as_array(hi.v, batch)
     with np.errstate(invalid="ignore", over="ignore"):
         length = np.abs(high - low)
@@ -30,7 +30,7 @@ def shells(lo: Cell, hi: Cell, rows: Sequence[Row], batch: int) -> list[Row]:
         return []
     sizes = SIZES[length[long].max() > SIZES]
     found: list[Row] = []
-    for middle in (low, high, *(as_array(row.x, batch) for row in rows)):
+    for middle in (low, high, np.zeros(batch), *(as_array(row.x, batch) for row in rows)):
         for size in (*-sizes, *sizes):
             found.append(Row(_beside(middle, size, long), (), RESTING, False))
     return found
