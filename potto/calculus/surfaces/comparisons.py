@@ -86,10 +86,11 @@ def by_brackets(term: Term) -> Term:
     bracket, then, orelse = brackets[place]
     decides, other = most(then, orelse), least(then, orelse)
     others = args[:place] + args[place + 1 :]
-    between = range_of(_extreme(term.op, others))
-    if between.hi > decides if greatest else between.lo < decides:
+    ranges = [range_of(arg) for arg in others]
+    least_of_others, most_of_others = most(each.lo for each in ranges), most(each.hi for each in ranges)
+    if most_of_others > decides if greatest else least_of_others < decides:
         return term
-    if other > between.lo if greatest else other < between.hi:
+    if other > least_of_others if greatest else other < most_of_others:
         others.append(const(other))
     rest = by_brackets(_extreme(term.op, others))
     sides = (const(decides), rest) if then == decides else (rest, const(decides))

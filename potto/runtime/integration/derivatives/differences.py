@@ -27,6 +27,7 @@ SHRINKS = 0.6  # what a gap may be of itself when the step is halved
 WEIGHTS = np.array([4 / 5, -1 / 5, 4 / 105, -1 / 280])  # of v(ih) - v(-ih), over h, exact up to degree 8
 LOWER = np.array([3 / 4, -3 / 20, 1 / 60, 0.0])  # up to degree 6
 SURE = 4.0  # times what two estimates differ by
+FAR = 0.5  # by which part of it a derivative may differ from what the two nearest points tell
 CANCELLED = 1e-9  # the part of what was added up that a derivative may be uncertain by: a zero that is known for one
 
 
@@ -51,11 +52,11 @@ def by_differences(problem: Problem, order: Integral, sums: Sums) -> Sums:
             noise = 2 * np.abs(WEIGHTS).sum() / (step / 2) * sums.e[:, member]
             if (sums.et[:, d, member] <= noise).all():
                 continue  # differences of values have no more digits
-            found = _derivative(one.env, int(d), step, one.beside)
+            t, et = sums.t[:, d, member], sums.et[:, d, member]
+            found = _derivative(one.env, int(d), step, one.beside, (t, et))
             if found is None:
                 continue
             value, off = found
-            t, et = sums.t[:, d, member], sums.et[:, d, member]
             better = np.isfinite(off) & ~(et <= off) & np.isfinite(value) & ~(np.abs(value - t) > et + off)
             t[:], et[:] = np.where(better, value, t), np.where(better, off, et)
     return sums
@@ -70,17 +71,26 @@ def _reaches(env: dict[str, Value], d: int) -> Iterator[float]:
 
 
 def _derivative(
-    env: dict[str, Value], d: int, step: float, evaluated: Callable[[dict[str, Value]], Sums]
-) -> tuple[Array, Array] | None:
-    """The derivative of all components, and how far off it may be; None where values are missing or there is a kink.
+    env: dict[str, Value], d: int, step: float, evaluated: Callable[[dict[str, Value]], Sums],
+    known: tuple[Array, Array],
+) -> tuple[Array, Array] | None:  # fmt: skip
+    """The derivative of all components, and how far off it may be; None where values are missing or there is a kink,
+    and where already the nearest ones tell of another derivative.
 
-    evaluated: the integral at other parameters.
+    evaluated: the integral at other parameters. known: the derivative to few digits, and its error.
     """
+    values: dict[float, tuple[Array, Array]] = {}
 
     def at(h: float) -> tuple[Array, Array]:
-        found = evaluated({n: still(moved(v, h, d)) for n, v in env.items()})
-        return found.v[:, 0], found.e[:, 0]
+        if h not in values:
+            found = evaluated({n: still(moved(v, h, d)) for n, v in env.items()})
+            values[h] = found.v[:, 0], found.e[:, 0]
+        return values[h]
 
+    (up, off), (down, below) = at(step / 2), at(-step / 2)
+    t, et = known
+    if (np.abs((up - down) / step - t) > FAR * np.abs(t) + et + (off + below) / step).any():
+        return None
     middle, noise = at(0.0)
     estimates, gaps = [], []
     for h in (step, step / 2):
