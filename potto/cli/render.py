@@ -277,6 +277,7 @@ def _once(options: argparse.Namespace, target: str, settings: Settings, console:
     from potto.applications.picture_files import NUMBERS, ending_of
     from potto.cli.opening import fail, report_others
     from potto.cli.rendering import drawn, layers, outlines, picture_of, save_figure
+    from potto.cli.uninterrupted import uninterrupted
     from potto.diagnostics import PottoError
     from potto.evaluating.world import World
 
@@ -290,23 +291,24 @@ def _once(options: argparse.Namespace, target: str, settings: Settings, console:
     except PottoError as error:
         console.progress("")
         return fail(error, options, console)
-    files = layers(picture, found, options, target)
     try:
-        if options.scale:
-            lines = outlines(world, file, picture, grid) if options.surfaces else ()
-            if options.surfaces and not lines:
+        with uninterrupted() as met:
+            files = layers(picture, found, options, target)
+            lines = outlines(world, file, picture, grid) if options.scale and options.surfaces else ()
+            if options.scale and options.surfaces and not lines:
                 console.complain(
                     "note: no surface can be drawn: none is seen here, or where it is takes more than symbols"
                 )
-            save_figure(target, files, picture, grid, _cost(found, grid, options), lines)
-        for layer in () if options.scale else files:
-            _write(layer, grid, options)
+            if options.scale:
+                save_figure(target, files, picture, grid, _cost(found, grid, options), lines)
+            for layer in () if options.scale else files:
+                _write(layer, grid, options)
     except OSError as error:
         why = f"`{error.filename}` cannot be written: {error.strerror}" if error.filename else str(error)
         console.complain(f"potto render: {why}")
         return 1
     _tell(files, found, grid, options, console)
-    return 130 if found.interrupted else report_others(world, file, options, console)
+    return 130 if found.interrupted or met else report_others(world, file, options, console)
 
 
 def _said(options: argparse.Namespace) -> list[tuple[str, str]]:

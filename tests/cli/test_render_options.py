@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import signal
 import subprocess
@@ -17,6 +18,7 @@ from potto.applications import animations
 from potto.applications.colours import DIVERGING, MAPS, TONES, Paint
 from potto.applications.images import Grid
 from potto.cli import render
+from potto.cli.uninterrupted import uninterrupted
 from potto.extras import install_command
 
 SCENE = """
@@ -279,7 +281,7 @@ def _started(folder: Path, *words: str) -> subprocess.Popen[str]:
 
 def _interrupted(folder: Path, *words: str) -> tuple[int, str, str]:
     """The end of a command that is interrupted once it has something to show: later on a machine that is busy."""
-    for seconds in (4.0, 5.5, 7.5, 10.0, 14.0, 20.0, 40.0):
+    for seconds in (2.0, 2.8, 4.0, 5.5, 7.5, 10.0, 14.0, 20.0, 40.0):
         process = _started(folder, *words)
         time.sleep(seconds)
         process.send_signal(signal.SIGINT)
@@ -296,6 +298,17 @@ def _until(condition: object, seconds: float = 60.0) -> bool:
             return True
         time.sleep(0.05)
     return False
+
+
+def test_what_is_done_is_written_before_an_interrupt_counts() -> None:
+    """Pictures that took a minute were lost to a Ctrl-C while they were being written."""
+    with uninterrupted() as met:
+        os.kill(os.getpid(), signal.SIGINT)
+        assert _until(lambda: met)
+        with pytest.raises(KeyboardInterrupt):
+            os.kill(os.getpid(), signal.SIGINT)
+            _until(lambda: False, 5.0)
+    assert met == [signal.SIGINT] and signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
 def test_watching_draws_again(tmp_path: Path) -> None:

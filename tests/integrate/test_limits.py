@@ -53,7 +53,7 @@ def test_more_samples_help_where_they_are_what_is_missing(body: str, method: Any
         longer = f(0.7)
     assert longer.evals > 20 * short.evals and longer.error < 0.5 * short.error
     with potto.settings(method=method, samples=2_000, rtol=1e-9, max_evals=1_000_000_000):
-        # As the advice says these are of no use here. Machine code, which may be there by now, adds up in another order.
+        # As the advice says: of no use here. Machine code may be there by now, and adds up in another order.
         assert f(0.7).error == pytest.approx(short.error, rel=1e-9)
 
 
